@@ -40,7 +40,7 @@ BUILD = ROOT / "build" / "coverage"
 REPORT = ROOT / "build" / "coverage.md"
 REASONS = ROOT / "tests" / "coverage.toml"
 FIRMWARE = ROOT / "firmware"
-COUNTED_FOLDERS = tuple(f"{FIRMWARE / name}{os.sep}" for name in ("src", "models", "link"))
+COUNTED_FOLDERS = tuple(f"{FIRMWARE / name}{os.sep}" for name in ("src", "link"))
 INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", *INCLUDES]
@@ -228,7 +228,7 @@ def report_of(files: list[File]) -> str:
     taken, branches = sum(file.taken for file in files), sum(file.branches for file in files)
     return f"""# Branch coverage
 
-{taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
+{taken} of the {branches} branches of `firmware/src` and `firmware/link` ({share(files):.1f} %)
 are taken by the CMocka programs, by what `tests/configurations.py` and `tests/playback_engine.py` play, and by
 {len(MECHANISMS)} files of tests that compile the core with a mechanism, as gcov counts them at -O0: every operand of
 a `&&` or `||` has two. Other tests do not count. PVID_ASSERT, which ends the program,

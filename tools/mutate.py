@@ -54,10 +54,10 @@ REPORT = ROOT / "build" / "mutants.md"
 REASONS = ROOT / "tests" / "mutants.toml"
 FIRMWARE = sources.FIRMWARE
 INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}"]
-PRIVATE = [path.relative_to(FIRMWARE) for path in (sources.SRC, sources.MODEL)]
+PRIVATE = sources.SRC.relative_to(FIRMWARE)
 LINK = FIRMWARE / "link" / "link.c"
 BESIDES = (*(ROOT / "host" / "native").glob("[lr]*.c"), LINK)  # of the shared library, beside the core
-ENGINE = re.compile(r"^(refine|weak)_|_(refine|weak)_")  # names of files that the strong form does without
+ENGINE = re.compile(r"^(refine|weak)_|_(refine|weak)_")  # names of files of the weak form and of its second stage
 COUNT = 240
 RECORDED = "--recorded" in sys.argv  # the workers of a pool read it, too
 LONGEST = 60  # seconds of processor time for what takes one
@@ -97,8 +97,7 @@ CORE = frozenset(sources.core_sources())
 
 def files_of_core() -> list[Path]:
     """Sources and private headers."""
-    found = [*sources.SRC.glob("*/*.[ch]"), *sources.MODEL.glob("*.[ch]")]
-    return sorted(found, key=lambda path: path.name)
+    return sorted(sources.SRC.glob("*/*.[ch]"), key=lambda path: path.name)
 
 
 def place(name: str) -> Path:
@@ -212,7 +211,7 @@ class Kit:
     def compiles(self, target: Path, source: Path, top: Path = FIRMWARE) -> bool:
         """Compiles a file whose private headers are those under `top`."""
         target.parent.mkdir(parents=True, exist_ok=True)
-        includes = [*INCLUDES, *(f"-I{top / folder}" for folder in PRIVATE)]
+        includes = [*INCLUDES, f"-I{top / PRIVATE}"]
         return ran([self.compiler, *COMMON, *self.options, *self.checks, *includes, "-c", source, "-o", target])
 
     def links(self, target: Path, objects: list[Path]) -> Path:
@@ -318,7 +317,7 @@ TESTS = replace(PLAIN, name="plain/tests", sources=tuple(playback_engine.unit_te
 
 def headers_of(kit: Kit, source: Path) -> set[str]:
     """The private headers that a source includes, also by way of others."""
-    includes = [*INCLUDES, *(f"-I{FIRMWARE / folder}" for folder in PRIVATE)]
+    includes = [*INCLUDES, f"-I{FIRMWARE / PRIVATE}"]
     command = [kit.compiler, *kit.options, *includes, "-MM", str(source)]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     private = {str(path) for path in files_of_core()}
@@ -645,7 +644,7 @@ def report_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
     could = told.mutants - len(told.equivalent)
     return f"""# Mutation check
 
-{told.mutants} mutants of the {files} files of `firmware/src` and `firmware/models`, drawn with seed {seed}, by each
+{told.mutants} mutants of the {files} files of `firmware/src`, drawn with seed {seed}, by each
 file's number of them: one operator, sign or constant changed. {told.killed} were killed:
 {100 * told.killed / told.mutants:.1f} % of all, and {100 * told.rate:.1f} % of the {could} that are not
 equivalent. {told.by_bits} of them by the bits of a few seconds of data

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Prints the refinement's functions of the pendulum that the core is shipped with; --check: only compares.
+"""Prints the refinement's functions of the pendulum, with which a core is built that is given no others.
+
+--check: only compares.
 
 Run it with build/venv/bin/python after a change of the pendulum's description or of the printers.
 """
@@ -17,7 +19,7 @@ from pvid.codegen.refine import refine_functions  # noqa: E402
 from pvid.models.mechanisms import compiled_of  # noqa: E402
 
 NAME = "kapitza"
-FOLDER = ROOT / "firmware" / "models" / NAME
+FOLDER = ROOT / "firmware" / "examples" / "refine_model"
 
 
 def main() -> None:
@@ -27,7 +29,7 @@ def main() -> None:
     made, command = refine_functions(compiled_of(NAME)), f"pvid model build {NAME}"
     for path, text in (
         (FOLDER / "refine_model_f32.h", header(made, command)),
-        (FOLDER / "include" / "pvid" / "refine_shape.h", shape(made, command)),
+        (FOLDER / "pvid" / "refine_shape.h", shape(made, command)),
     ):
         if not check:
             path.write_text(text, encoding="utf-8")

@@ -42,7 +42,7 @@ ROOT = Path(__file__).resolve().parents[1]
 INCLUDES = " ".join(
     f"-I'{ROOT / name}'"
     for name in (
-        *("firmware/include", "firmware/src", "firmware/models/kapitza", "firmware/models/kapitza/include"),
+        *("firmware/include", "firmware/src", "firmware/examples/refine_model"),
         *("firmware/link", "firmware/ports", "tests/proofs", "tests/unit"),
     )
 )
@@ -98,8 +98,6 @@ TAKEN_IN_STAGES = (
     "pvid_cholesky_solve_q31",
 )
 
-TAKEN_OF_STRONG_SUMS = (*("pvid_kapitza_project_q31", "pvid_kapitza_exponents_q31", "pvid_kapitza_residual_q31"),)
-
 PROOFS = (
     Proof(
         "integer_q31",
@@ -126,45 +124,6 @@ PROOFS = (
         ("src/number/elementary_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "142"),
         taken=("pvid_scaled_of_q31",),
-    ),
-    Proof(
-        "differentiator_q31",
-        "the five-point bank at strides 1 to 3, from empty to three times round, any counts within 2^22",
-        ("src/strong/differentiator_q31.c", "src/number/integer_q31.c"),
-        ("-eva-auto-loop-unroll", "60", "-eva-min-loop-unroll", "40"),
-    ),
-    Proof(
-        "differentiator_banks_q31",
-        "any weights, shifts and full scales, any half and stride of windows up to 41 samples and the longest of each",
-        ("src/strong/differentiator_q31.c", "src/number/integer_q31.c"),
-        (
-            *("-eva-min-loop-unroll", "161", "-eva-split-return", "full"),
-            *(
-                "-eva-slevel-function",
-                "any_bank:10,prepare:10,pvid_differentiator_init_q31:10,pvid_differentiator_init_layout_q31:10",
-            ),
-        ),
-        left=(
-            r"signed overflow\.\s+assert .*\b48 \* (phi|y)_even",
-            r"signed overflow\.\s+assert .*(phi|y)\d \+ tmp",
-            r"signed downcast\.\s+assert .*\btmp\b",
-            r"signed downcast\. assert largest ",
-            r"signed overflow\.\s+assert tmp \+ 1 ",
-        ),
-        why="what `init` itself finds by sums over the weights, and intervals forget: the sum over all weights times "
-        "the largest difference fits 62 bits, with five points written out 32, and the sum that any counts can reach "
-        "fits a derivative. `differentiator_q31` shows it for the bank of five points",
-    ),
-    Proof(
-        "kapitza_q31",
-        "the strong form's rows from any derivatives; the innovation of any row at any p",
-        ("src/number/integer_q31.c",),
-        (
-            *("-eva-auto-loop-unroll", "200", "-eva-split-return", "full", "-eva-slevel-function"),
-            "pvid_kapitza_strong_row_q31:100,take_angles:50,three_powers:20,powers_to_3:20,powers_to_4:20,"
-            "pvid_kapitza_estimator_innovate_q31:200,any_innovation:50",
-        ),
-        taken=("term",),
     ),
     Proof(
         "block_q31",
@@ -220,94 +179,6 @@ PROOFS = (
         taken=TAKEN_IN_STAGES,
     ),
     Proof(
-        "strong_q31",
-        "any configuration; any tick on top of any state, whatever the bank's derivatives",
-        (
-            *("src/judge/gate_q31.c", "src/solve/assess_q31.c"),
-            *("src/number/scaled_q31.c", "src/number/integer_q31.c"),
-        ),
-        (
-            *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
-            *("-inline-calls", "is_within", "-eva-domains", "equality", "-eva-slevel-function"),
-            "main:50,any_configuration:200,any_tick:200,prepare:100,pvid_strong_init_q31:100,pvid_gate_init_q31:50,"
-            "shifts_are_valid:5,multipliers_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,"
-            "take_row:20,pvid_differentiator_step_q31:5,pvid_gate_passes_q31:5",
-        ),
-        taken=(
-            *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
-            *("pvid_differentiator_init_layout_q31", "pvid_differentiator_step_q31", "pvid_differentiator_reset_q31"),
-            *("pvid_kapitza_strong_row_q31", "pvid_kapitza_estimator_innovate_q31", "acceleration"),
-            *("pvid_kapitza_estimator_init_q31", "pvid_kapitza_estimator_take_q31"),
-            *("pvid_misfit_init_q31", "pvid_misfit_signal_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
-        ),
-    ),
-    Proof(
-        "kapitza_sums_q31",
-        "the strong form's sums: any row on top of any sums within 2^61, its end at any age and exponent up to 30",
-        ("models/kapitza/kapitza_sums_q31.c", "src/number/integer_q31.c"),
-        ("-eva-min-loop-unroll", "80"),
-    ),
-    Proof(
-        "kapitza_project_q31",
-        "the strong form's normal equations: any sums within 2^61, any p and formats, near the reference and far off",
-        ("src/number/integer_q31.c",),
-        ("-eva-min-loop-unroll", "60", "-eva-slevel-function", "pvid_kapitza_project_q31:20,main:20"),
-        taken=("pvid_scale_q31", "pvid_bit_length_q31", "take_mantissas", "take_64", "as_part"),
-    ),
-    Proof(
-        "kapitza_solve_q31",
-        "a row and a solve of the strong form: any such equations, any p, any settings; p stays positive",
-        (
-            *("src/solve/assess_q31.c", "src/solve/settings_q31.c", "src/solve/information_q31.c"),
-            *("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
-        ),
-        (
-            *("-eva-min-loop-unroll", "60", "-eva-split-return", "full", "-eva-slevel-function"),
-            "solve:50,factorise:50,main:20,solve_for:20,take_step:30",
-        ),
-        taken=(
-            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_half_exponent_q31", *SCALED, *TAKEN_OF_STRONG_SUMS),
-            *("pvid_kapitza_add_q31", "pvid_kapitza_end_row_q31"),
-            *("equilibrated", "on_diagonal", "raised", "entry_of_l", "beside"),
-            *("right_hand_side", "lifted", "inverse_of"),
-        ),
-    ),
-    Proof(
-        "kapitza_residual_q31",
-        "the strong form's residual: any sums within 2^61, any p and formats",
-        ("models/kapitza/kapitza_residual_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
-        ("-eva-min-loop-unroll", "60"),
-        taken=("pvid_scale_q31", "pvid_bit_length_q31", *SCALED),
-    ),
-    Proof(
-        "kapitza_assess_q31",
-        "an assessment of the strong form: any such equations and residual, any settings",
-        (
-            *("models/kapitza/kapitza_assess_q31.c", "src/solve/assess_q31.c", "src/solve/system_q31.c"),
-            *("src/solve/settings_q31.c", "src/solve/cholesky_q31.c"),
-            *("src/number/scaled_q31.c", "src/number/integer_q31.c"),
-        ),
-        (
-            *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
-            "-eva-slevel-function",
-            "main:50,pvid_system_eliminate_q31:30,pvid_kapitza_estimator_assess_q31:200,pvid_assess_invert_q31:20,factor:60",
-        ),
-        taken=(*TAKEN_IN_STAGES, *TAKEN_OF_STRONG_SUMS),
-        left=(
-            r"function pvid_cholesky_eliminate_q31: precondition self->positive",
-            r"function pvid_cholesky_least_pivot_q31: precondition",
-        ),
-        why="that a factor which is positive so far has its rows and pivots: joined paths forget which of the two "
-        "holds. `estimator_assess_q31` keeps them apart in the same functions",
-    ),
-    Proof(
-        "kapitza_physical_q31",
-        "any estimate in any scale",
-        ("models/kapitza/kapitza_physical_q31.c", "src/solve/cholesky_q31.c", "src/number/integer_q31.c"),
-        ("-eva-slevel", "100", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
-        taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_root_of_q31", "pvid_to_block_q31"),
-    ),
-    Proof(
         "gate_q31",
         "any configuration and floor; any residual on top of any scale that a residual leaves",
         ("src/judge/gate_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
@@ -336,15 +207,10 @@ PROOFS = (
     ),
     Proof(
         "fingerprint_q31",
-        "any configuration of the strong form, a bank of any extent that fits; `pvid_fnv_estimator_q31`, any state",
+        "any settings of the gate and the estimator; `pvid_fnv_estimator_q31`, any state",
         (
-            *(
-                "src/persist/fingerprint_q31.c",
-                *("src/number/fingerprint_numbers_q31.c", "src/judge/gate_q31.c", "src/solve/settings_q31.c"),
-                "src/persist/fingerprint_tables.c",
-                "src/persist/fnv_q31.c",
-                "src/number/fnv.c",
-            ),
+            *("src/number/fingerprint_numbers_q31.c", "src/judge/gate_q31.c", "src/solve/settings_q31.c"),
+            *("src/persist/fnv_q31.c", "src/number/fnv.c"),
         ),
         ("-eva-auto-loop-unroll", "20"),
     ),
@@ -392,19 +258,15 @@ PROOFS = (
     ),
     Proof(
         "snapshot_q31",
-        "states of all forms saved into any room, any bytes of any length restored; their pointers stay",
+        "any state of the weak form saved into any room, any bytes of any length restored; its pointers stay",
         (
             "src/persist/snapshot_weak_q31.c",
-            "src/persist/snapshot_strong_q31.c",
             "src/persist/snapshot.c",
             "src/persist/crc32.c",
             "src/number/fnv.c",
         ),
         ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
-        taken=(
-            *("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31"),
-            *("pvid_fingerprint_weak_model_q31", "pvid_fingerprint_weak_design_q31"),
-        ),
+        taken=(*("pvid_fingerprint_weak_q31", "pvid_fingerprint_weak_model_q31", "pvid_fingerprint_weak_design_q31"),),
     ),
     Proof(
         "receiver",

@@ -17,8 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 FIRMWARE = ROOT / "firmware"
 PORTS = FIRMWARE / "ports"
-INCLUDES = [f"-I{FIRMWARE / name}" for name in ("include", "src", "link", "ports")]
-INCLUDES += [f"-I{folder}{name}" for folder in sorted(FIRMWARE.glob("models/*")) for name in ("", "/include")]
+INCLUDES = [f"-I{FIRMWARE / name}" for name in ("include", "src", "link", "ports", "examples/refine_model")]
 RIG = f"-I{ROOT / 'tests' / 'analysis'}"  # of the applications
 LANGUAGE = ["-std=c99", "-ffp-contract=off"]
 
@@ -66,9 +65,7 @@ def _units(machine: str, sources: list[Path], *options: str) -> list[Unit]:
 
 def core(machine: str) -> list[Unit]:
     """The core and the link; of an AVR, whose double is a float, the sources are the same."""
-    return _units(
-        machine, sorted(path for folder in ("src/*", "models/*", "link") for path in FIRMWARE.glob(f"{folder}/*.c"))
-    )
+    return _units(machine, sorted([*FIRMWARE.glob("src/*/*.c"), *FIRMWARE.glob("link/*.c")]))
 
 
 def ports() -> list[Unit]:

@@ -3,7 +3,8 @@ include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 
 install(TARGETS pvid EXPORT pvid-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY include/pvid ${pvid_model_folder}/include/pvid DESTINATION include)
+install(DIRECTORY include/pvid DESTINATION include)
+install(FILES ${pvid_refine_model}/pvid/refine_shape.h DESTINATION include/pvid)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(EXPORT pvid-targets NAMESPACE pvid:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pvid)
 

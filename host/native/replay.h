@@ -22,19 +22,8 @@ typedef struct {
 /* Compiler and flags this library was built with. */
 const char *pvid_native_build(void);
 
-/* Steps an initialised identifier through a run. */
-void pvid_replay_strong_f32(pvid_strong_f32 *self, uint32_t ticks, const float phi[], const float y[],
-                            const pvid_record_f32 *record);
-
 /* Steps an initialised estimator through given rows n[ticks][n_theta], y[ticks]. */
 void pvid_replay_rows_f32(pvid_estimator_f32 *self, uint32_t ticks, const float n[], const float y[],
                           const pvid_record_f32 *record);
-
-/* Steps an initialised identifier of the strong form through given derivatives phi[ticks][5] and u[ticks][3]. */
-void pvid_replay_derivatives_f32(pvid_strong_f32 *self, uint32_t ticks, const float phi[], const float u[],
-                                 const pvid_record_f32 *record);
-
-/* Rows of the strong form from phi[ticks][5] and u[ticks][3]. */
-void pvid_replay_strong_rows_f32(uint32_t ticks, const float phi[], const float u[], float n[], float y[]);
 
 #endif

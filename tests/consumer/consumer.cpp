@@ -2,11 +2,7 @@
 // Prints "version MAJOR.MINOR.PATCH harmonics PVID_MAX_HARMONICS".
 #include "pvid/weak.h"
 
-#include "pvid/strong.h"
-
 #include "pvid/weak_q31.h"
-
-#include "pvid/strong_q31.h"
 
 #include "pvid/fnv.h"
 
@@ -21,9 +17,7 @@ namespace
 {
 
 pvid_weak_f32 weak;
-pvid_strong_f32 strong;
 pvid_weak_q31 weak_integers;
-pvid_strong_q31 strong_integers;
 
 } // namespace
 
@@ -33,16 +27,9 @@ int main()
     // are refused.
     pvid_weak_config_f32 weak_config{};
     weak_config.estimator = pvid_estimator_defaults_f32;
-    pvid_strong_config_f32 strong_config{};
-    strong_config.estimator = pvid_estimator_defaults_f32;
     const pvid_weak_config_q31 weak_config_q31{};
-    const pvid_strong_config_q31 strong_config_q31{};
     if (pvid_weak_init_q31(&weak_integers, &weak_config_q31) == PVID_OK ||
-        pvid_strong_init_q31(&strong_integers, &strong_config_q31) == PVID_OK) {
-        return 1;
-    }
-    if (pvid_weak_init_f32(&weak, &weak_config) == PVID_OK ||
-        pvid_strong_init_f32(&strong, &strong_config) == PVID_OK || pvid_arithmetic_faults_f32() != 0) {
+        pvid_weak_init_f32(&weak, &weak_config) == PVID_OK || pvid_arithmetic_faults_f32() != 0) {
         return 1;
     }
     std::printf("version %d.%d.%d harmonics %d\n", PVID_VERSION_MAJOR, PVID_VERSION_MINOR, PVID_VERSION_PATCH,

@@ -16,7 +16,6 @@
 #include "pvid/pvid_q31.h"
 #include "pvid/snapshot_refine.h"
 #include "pvid/snapshot_weak_q31.h"
-#include "strong_table_q31.h"
 
 #define LAST_REASON PVID_NOT_READY
 #define ROOM ((size_t)PVID_SNAPSHOT_REFINE_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
@@ -88,8 +87,6 @@ static void check_p_q31(const pvid_estimator_q31 *estimator)
                 "q31 p within its bounds");
     }
 }
-
-static const float starts[4] = {31.0f, 8.0f, 5.0f, 0.0f};
 
 static void spoil(float *const fields[], size_t n)
 {
@@ -256,16 +253,11 @@ static void check_weak(bool published)
     }
     pvid_estimate_f32 copy;
     uint32_t number;
-    pvid_kapitza_f32 value;
-    pvid_kapitza_f32 se;
     const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(&weak.self);
     check_estimate_f32(estimate, weak.self.estimator.model->n_p);
     require(pvid_weak_read_f32(&weak.self, &copy, &number) && ((number > 0u) == weak.self.trust.published) &&
                 (memcmp(&copy, estimate, sizeof copy) == 0),
             "a read estimate is the published one");
-    if (pvid_kapitza_physical_f32(estimate, 0.3f, &value, &se)) {
-        require(isfinite(value.g) && isfinite(se.g) && isfinite(value.l2) && isfinite(se.rho2), "finite parameters");
-    }
     pvid_estimator_assess_f32(&weak.self.estimator, &copy);
     check_estimate_f32(&copy, weak.self.estimator.model->n_p);
 }
@@ -417,121 +409,6 @@ static bool refined_has_published(void)
     return refined.self.published > 0u;
 }
 
-/* ---- strong, float32 ---- */
-
-static struct {
-    pvid_strong_f32 self;
-    pvid_strong_config_f32 config;
-    pvid_publication_f32 shared;
-    float bank[PVID_ORDERS * 16];
-} strong;
-
-static void configure_strong(bool sound)
-{
-    static const pvid_strong_config_f32 fresh = {.sample_rate_hz = 1000.0f, .l1 = 0.3f};
-    pvid_strong_config_f32 *config = &strong.config;
-    *config = fresh;
-    config->bank = (pvid_fir_bank_f32){.half = 2, .stride = 20, .weights = pvid_five_points_f32};
-    config->estimator = pvid_estimator_defaults_f32;
-    for (size_t i = 0; i < 3u; i++) {
-        config->estimator.start[i] = starts[i];
-        config->estimator.start_sd[i] = 0.5f * starts[i];
-        config->estimator.lower[i] = starts[i] / 20.0f;
-        config->estimator.upper[i] = starts[i] * 20.0f;
-    }
-    config->estimator.row_sd = 1.0e5f;
-    config->estimator.feedback_hz = one_in(2) ? 10.0f : 0.0f;
-    config->estimator.forgetting_s = one_in(3) ? 3.0f : 0.0f;
-    config->estimator.law = (pvid_law)below(2);
-    config->estimator.divider = (uint16_t)(one_in(3) ? (4u * below(17)) + 4u : 1u + below(5));
-    config->estimator.dead_zone = one_in(5) ? 3.0f : 0.0f;
-    config->exact_every = (uint16_t)below(10);
-    config->bank.block = (uint16_t)below(6);
-    config->drive_min = one_in(2) ? 0.1f : 0.0f;
-    config->gate.sigmas = one_in(2) ? 6.0f : 0.0f;
-    if (sound) {
-        return;
-    }
-    float *const fields[] = {&config->sample_rate_hz, &config->l1, &config->drive_min, &config->gate.sigmas,
-                             &config->gate.patience_s};
-    if (one_in(2)) {
-        spoil(fields, sizeof fields / sizeof fields[0]);
-    }
-    if (one_in(2)) {
-        spoil_estimator_f32(&config->estimator);
-    }
-    if (one_in(4)) {
-        for (size_t i = 0; i < sizeof strong.bank / sizeof strong.bank[0]; i++) {
-            strong.bank[i] = one_in(200) ? hostile_float() : ((any_part() - 0.5f) * 10.0f);
-        }
-        config->bank.half = (uint16_t)(2u + below(14));
-        config->bank.stride = (uint16_t)(1u + below(12));
-        config->bank.weights = strong.bank;
-    }
-    config->bank.stride = one_in(8) ? (uint16_t)any_word() : config->bank.stride;
-    if (one_in(8)) {
-        config->bank.half = (uint16_t)any_word();
-        config->bank.weights = (config->bank.half > 16u) ? NULL : strong.bank;
-    }
-}
-
-static pvid_status init_strong(void)
-{
-    return pvid_strong_init_f32(&strong.self, &strong.config);
-}
-
-static pvid_reason step_strong(uint32_t kind, unsigned long tick)
-{
-    float phi;
-    float y;
-    hostile_sample(kind, tick, &phi, &y);
-    return pvid_strong_step_f32(&strong.self, phi, y);
-}
-
-static void gap_strong(void)
-{
-    pvid_strong_gap_f32(&strong.self);
-}
-
-static void freeze_strong(bool frozen)
-{
-    pvid_strong_freeze_f32(&strong.self, frozen);
-}
-
-static void check_strong(bool published)
-{
-    const pvid_strong_estimator_f32 *estimator = &strong.self.estimator;
-    for (size_t i = 0; i < PVID_KAPITZA_P; i++) {
-        require(isfinite(estimator->p[i]) && (estimator->p[i] >= strong.config.estimator.lower[i]) &&
-                    (estimator->p[i] <= strong.config.estimator.upper[i]),
-                "p within its bounds");
-    }
-    if (published && one_in(50)) {
-        pvid_estimate_f32 estimate;
-        pvid_estimate_f32 copy;
-        pvid_strong_assess_f32(&strong.self, &estimate);
-        check_estimate_f32(&estimate, 3);
-        pvid_publication_put_f32(&strong.shared, &estimate);
-        require(pvid_publication_read_f32(&strong.shared, &copy, NULL) && (memcmp(&copy, &estimate, sizeof copy) == 0),
-                "a read estimate is the one that was put");
-    }
-}
-
-static size_t save_strong(uint8_t image[], size_t room)
-{
-    return pvid_snapshot_save_strong_f32(&strong.self, &strong.config, any_word(), image, room);
-}
-
-static pvid_snapshot_status restore_strong(const uint8_t image[], size_t length)
-{
-    return pvid_snapshot_restore_strong_f32(&strong.self, &strong.config, image, length);
-}
-
-static void clear_strong(void)
-{
-    memset(&strong.self, 0, sizeof strong.self);
-}
-
 /* ---- weak, integers ---- */
 
 #define PENDULUM_TERMS 13
@@ -671,110 +548,13 @@ static void clear_weak_q31(void)
     memset(&weak_q31.self, 0, sizeof weak_q31.self);
 }
 
-/* ---- strong, integers ---- */
-
-static struct {
-    pvid_strong_q31 self;
-    pvid_strong_config_q31 config;
-} strong_q31;
-
-static void configure_strong_q31(bool sound)
-{
-    pvid_strong_config_q31 *config = &strong_q31.config;
-    *config = strong_unit;
-    if (sound) {
-        return;
-    }
-    if (one_in(2)) {
-        spoil_estimator_q31(&config->estimator);
-    }
-    config->u_multiplier[1] = one_in(5) ? any_i32() : config->u_multiplier[1];
-    config->u_shift[2] = one_in(5) ? (uint8_t)below(70) : config->u_shift[2];
-    config->drive_min = one_in(5) ? any_i32() : config->drive_min;
-    config->drive_ticks = one_in(5) ? any_word() : config->drive_ticks;
-    config->bank.phi_shift[0] = one_in(5) ? (uint8_t)below(70) : config->bank.phi_shift[0];
-    config->bank.phi_max = one_in(5) ? any_i32() : config->bank.phi_max;
-    config->bank.centre = one_in(5) ? any_i32() : config->bank.centre;
-    config->bank.stride = one_in(8) ? (uint16_t)any_word() : config->bank.stride;
-    config->bank.block = one_in(8) ? (uint16_t)below(400) : config->bank.block;
-    config->bank.weights = one_in(20) ? NULL : config->bank.weights;
-    config->phi_offset = one_in(5) ? any_i32() : config->phi_offset;
-    config->row.phi_shift[3] = one_in(8) ? (int8_t)((int32_t)below(100) - 50) : config->row.phi_shift[3];
-    config->row.finer[1] = one_in(8) ? (int8_t)((int32_t)below(100) - 50) : config->row.finer[1];
-    config->row.phi3 = one_in(8) ? any_i32() : config->row.phi3;
-    config->row.reference = one_in(8) ? any_i32() : config->row.reference;
-    config->gate.sigmas = one_in(8) ? any_word() : config->gate.sigmas;
-}
-
-static pvid_status init_strong_q31(void)
-{
-    return pvid_strong_init_q31(&strong_q31.self, &strong_q31.config);
-}
-
-static pvid_reason step_strong_q31(uint32_t kind, unsigned long tick)
-{
-    static const double lsb[2] = {6.0e-6, 5.0e-6};
-    static const int32_t full_scale[2] = {83443, 6000};
-    int32_t phi;
-    int32_t y;
-    hostile_counts(kind, tick, lsb, full_scale, &phi, &y);
-    return pvid_strong_step_q31(&strong_q31.self, phi, y);
-}
-
-static void gap_strong_q31(void)
-{
-    pvid_strong_gap_q31(&strong_q31.self);
-}
-
-static void freeze_strong_q31(bool frozen)
-{
-    pvid_strong_freeze_q31(&strong_q31.self, frozen);
-}
-
-static void check_strong_q31(bool published)
-{
-    const pvid_kapitza_estimator_q31 *estimator = &strong_q31.self.estimator;
-    for (size_t i = 0; i < PVID_KAPITZA_P; i++) {
-        require((estimator->p[i] >= estimator->settings.lower[i]) && (estimator->p[i] <= estimator->settings.upper[i]),
-                "q31 p within its bounds");
-    }
-    if (published && one_in(50)) {
-        pvid_estimate_q31 estimate;
-        pvid_kapitza_estimator_assess_q31(&strong_q31.self.estimator, &estimate);
-    }
-}
-
-static size_t save_strong_q31(uint8_t image[], size_t room)
-{
-    return pvid_snapshot_save_strong_q31(&strong_q31.self, &strong_q31.config, any_word(), image, room);
-}
-
-static pvid_snapshot_status restore_strong_q31(const uint8_t image[], size_t length)
-{
-    return pvid_snapshot_restore_strong_q31(&strong_q31.self, &strong_q31.config, image, length);
-}
-
-static void clear_strong_q31(void)
-{
-    memset(&strong_q31.self, 0, sizeof strong_q31.self);
-}
-
-static bool publishes_nothing(void)
-{
-    return false;
-}
-
 static const form forms[] = {
     {"weak f32", configure_weak, init_weak, step_weak, gap_weak, freeze_weak, check_weak, save_weak, restore_weak,
      weak_has_published, clear_weak, 12000},
     {"refined f32", configure_refined, init_weak, step_weak, gap_weak, freeze_weak, check_refined, save_refined,
      restore_refined, refined_has_published, clear_weak, 12000},
-    {"strong f32", configure_strong, init_strong, step_strong, gap_strong, freeze_strong, check_strong, save_strong,
-     restore_strong, publishes_nothing, clear_strong, 6000},
     {"weak q31", configure_weak_q31, init_weak_q31, step_weak_q31, gap_weak_q31, freeze_weak_q31, check_weak_q31,
      save_weak_q31, restore_weak_q31, weak_q31_has_published, clear_weak_q31, 12000},
-    {"strong q31", configure_strong_q31, init_strong_q31, step_strong_q31, gap_strong_q31, freeze_strong_q31,
-     check_strong_q31, save_strong_q31, restore_strong_q31, publishes_nothing, clear_strong_q31, 3000},
 };
 
 /* ---- the calls ---- */

@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pvid.cli.main import commands
-from pvid.core.native import Native
 from pvid.models.kapitza.physical import linear, physical
 from pvid.models.model import Mechanism, Model
 from pvid.models.registry import DEFAULT, MODELS
@@ -138,23 +137,6 @@ def test_errors_of_the_physical_parameters_by_the_delta_method() -> None:
     np.testing.assert_array_equal(
         mechanism.physical_errors([*truth, 0.1], wider), mechanism.physical_errors(truth, covariance)
     )
-
-
-# ---- names in C
-
-
-def test_parameters_have_the_places_that_the_headers_of_the_core_give_them(native: Native) -> None:
-    model = MODELS[DEFAULT]
-    names = model.p_names[:3]  # the strong form has no zero of the encoder
-    places = [getattr(native.library, f"PVID_{model.name}_{name}".upper()) for name in names]
-    assert places == list(range(3))
-
-
-def test_physical_parameters_are_the_fields_of_the_struct_of_the_core(native: Native) -> None:
-    model = MODELS[DEFAULT]
-    for core in ("f32", "q31"):
-        fields = native.headers.ffi.typeof(f"pvid_{model.name}_{core}").fields
-        assert [name for name, _ in fields] == list(model.physical_names)
 
 
 def test_the_command_lists_every_model_with_its_quantities() -> None:

@@ -3,7 +3,6 @@
 #include "any_estimator_q31.h"
 
 #include "contracts.h"
-#include "strong_contracts.h"
 
 static void any_configuration(const pvid_model_q31 *model, uint8_t placed)
 {

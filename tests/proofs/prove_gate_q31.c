@@ -2,7 +2,7 @@
 #include "prove.h"
 
 #include "contracts.h"
-#include "strong_contracts.h"
+#include "pvid/gate_q31.h"
 
 #define LOWEST (-2000) /* exponent of a floor */
 #define HIGHEST 71     /* and of the largest scale */

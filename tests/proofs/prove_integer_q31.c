@@ -59,20 +59,8 @@ static void any_far_shift(int64_t x)
     (void)pvid_scale_q31(x, any_i32(-INT32_MAX, -65));
 }
 
-/* That it narrows where a result fits: a product of 32 bits or a shift of 64 loses nothing. */
-static void any_narrowing(uint32_t s)
-{
-    int32_t out = 0;
-    const int64_t x = any_i64(-PVID_WIDE, PVID_WIDE);
-    (void)pvid_narrows_q31(x, s, 29, &out);
-    (void)pvid_narrows_q31(x, s, 30, &out);
-}
-
 void main(void)
 {
-    for (uint32_t s = 0; s <= 62u; s++) {
-        any_narrowing(s);
-    }
     for (uint32_t bits = 0; bits <= 62u; bits++) {
         any_length(bits, false);
         any_length(bits, true);

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from pvid.core.sources import INCLUDES, MODEL, SRC, core_sources
+from pvid.core.sources import INCLUDES, SRC, core_sources
 
 # Each room may use itself and those before it; the forms do not use each other.
-ROOMS = ("number", "solve", "judge", "strong", MODEL.name, "weak", "refine", "persist")
+ROOMS = ("number", "solve", "judge", "strong", "weak", "refine", "persist")
 FORMS = ("strong", "weak", "refine")
 STRANGERS = {(a, b) for a in FORMS for b in FORMS if a != b}
 
@@ -45,13 +45,14 @@ def uses(tmp_path_factory: pytest.TempPathFactory) -> Graph:
     defined: dict[str, str] = {}
     for source, listing in zip(sources, listings, strict=True):
         defined |= dict.fromkeys(re.findall(r" [TDRB] (\w+)$", listing, re.MULTILINE), node(source))
-    graph: Graph = {node(path): set() for path in [*SRC.glob("*/*.[ch]"), *MODEL.glob("*.[ch]")]}
+    graph: Graph = {node(path): set() for path in SRC.glob("*/*.[ch]")}
     for source, listing in zip(sources, listings, strict=True):
         wanted = re.findall(r" U (\w+)$", listing, re.MULTILINE)
         graph[node(source)] |= {defined[name] for name in wanted if name in defined}
-    for path in [*SRC.glob("*/*.[ch]"), *MODEL.glob("*.[ch]")]:
-        for name in re.findall(r'^#include "(?!pvid/)(.*)\.h"$', path.read_text(encoding="utf-8"), re.MULTILINE):
-            graph[node(path)].add(name if "/" in name else f"{MODEL.name}/{name}")
+    for path in SRC.glob("*/*.[ch]"):
+        graph[node(path)] |= set(
+            re.findall(r'^#include "(?!pvid/|refine_model)(.*)\.h"$', path.read_text(encoding="utf-8"), re.MULTILINE)
+        )
     return {name: used - {name} for name, used in graph.items()}
 
 

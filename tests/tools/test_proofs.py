@@ -19,7 +19,7 @@ def prove(top: Path, name: str = "link") -> subprocess.CompletedProcess[str]:
 
 def copy(top: Path, *names: str) -> None:
     """These files and folders of the repository, what proves them, and the contracts."""
-    for name in ("firmware/include", "firmware/models", "tests/proofs", "tools/prove.py", "tools/kept.py", *names):
+    for name in ("firmware/include", "tests/proofs", "tools/prove.py", "tools/kept.py", *names):
         (top / name).parent.mkdir(parents=True, exist_ok=True)
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, top / name)

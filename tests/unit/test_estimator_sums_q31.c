@@ -15,11 +15,9 @@
 #include "solve/assess_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
-#include "plant.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
 #include "number/scaled_q31.h"
-#include "strong_table_q31.h"
 
 /* ---- y = N^T p with as many entries as there may be parameters ---- */
 
@@ -379,61 +377,6 @@ static void counters_stop_at_their_end(void **state)
     }
 }
 
-/* ---- the strong form's eleven entries ---- */
-
-/* The same samples through the float core: what it makes of them, biased as five points are by fast motion. */
-static void the_strong_form_agrees_with_the_float_core(void **state)
-{
-    (void)state;
-    static pvid_strong_q31 self;
-    static pvid_strong_f32 other;
-    static const double unit[3] = {1.1641532182693481e-06, 5.9604644775390625e-08, 2.9802322387695312e-08};
-    const int32_t gains[3] = {strong_unit.estimator.gain, 1 << 30, 0};
-    for (int k = 0; k < 3; k++) {
-        pvid_strong_config_q31 settings = strong_unit;
-        settings.phi_offset = -321;
-        settings.y_offset = 45;
-        settings.estimator.gain = gains[k];
-        settings.estimator.divider = (k == 1) ? 3 : 1;
-        pvid_strong_config_f32 in_float = {
-            .sample_rate_hz = 1000.0f,
-            .l1 = 0.3f,
-            .bank = {.half = 2, .stride = 20, .weights = pvid_five_points_f32},
-            .estimator = pvid_estimator_defaults_f32,
-        };
-        for (int i = 0; i < 3; i++) {
-            in_float.estimator.start[i] = (float)(unit[i] * settings.estimator.start[i]);
-            in_float.estimator.start_sd[i] = (float)(unit[i] * settings.estimator.start_sd[i]);
-            in_float.estimator.lower[i] = (float)(unit[i] * settings.estimator.lower[i]);
-            in_float.estimator.upper[i] = (float)(unit[i] * settings.estimator.upper[i]);
-        }
-        in_float.estimator.row_sd = 1.0e3f;
-        assert_int_equal(pvid_strong_init_q31(&self, &settings), PVID_OK);
-        assert_int_equal(pvid_strong_init_f32(&other, &in_float), PVID_OK);
-        plant_state plant = released_plant();
-        int reasons[16] = {0};
-        for (int i = 0; i < 12000; i++) {
-            double phi;
-            double y;
-            plant_step(&plant, &phi, &y);
-            const int32_t angle = (int32_t)floor((phi / 5.992112452678286e-06) + 0.5);
-            const int32_t height = (int32_t)floor((y / 5.0e-06) + 0.5);
-            reasons[pvid_strong_step_q31(&self, angle - 321, height + 45)]++;
-            (void)pvid_strong_step_f32(&other, (float)(angle * 5.992112452678286e-06), (float)(height * 5.0e-06));
-        }
-        assert_int_equal(reasons[PVID_WARMING_UP], 80);
-        const int solved = reasons[PVID_UPDATED] + reasons[PVID_ACCUMULATED] + reasons[PVID_HELD_SINGULAR];
-        assert_int_equal(solved + reasons[PVID_HELD_NOT_EXCITED], 12000 - 80);
-        assert_in_range(self.estimator.counters.rows, 11800, 11920);
-        assert_in_range(reasons[PVID_ACCUMULATED], (k == 1) ? 7800 : 0, (k == 1) ? 7947 : 0);
-        for (int i = 0; i < 3; i++) {
-            /* the paper's law keeps something of its first steps, which differ */
-            const double ratio = (unit[i] * (double)self.estimator.p[i]) / (double)other.estimator.p[i];
-            assert_true(fabs(ratio - 1.0) < ((k == 2) ? 0.05 : 0.01));
-        }
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -446,7 +389,6 @@ int main(void)
         cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),
         cmocka_unit_test_setup(steps_are_limited_and_bounded, start_again),
         cmocka_unit_test(counters_stop_at_their_end),
-        cmocka_unit_test(the_strong_form_agrees_with_the_float_core),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,7 +7,6 @@
 #include "judge/misfit_q31.h"
 #include "pvid/pvid_q31.h"
 #include "number/scaled_q31.h"
-#include "strong_table_q31.h"
 
 #define UNIT 1000000 /* of e and of what is told */
 
@@ -111,36 +110,6 @@ static void the_largest_rows_do_not_overflow(void **state)
     assert_false(pvid_misfit_judge_q31(&misfit));
 }
 
-/* What the strong form tells of a row: every term as often as w is a factor of it, here without and with a drive. */
-static void a_term_counts_by_its_power_of_w(void **state)
-{
-    (void)state;
-    static const size_t places[] = {0, 1, 5, 10}; /* of the factors of w, w^2, d1 and d2 */
-    pvid_strong_row_q31 rows = strong_unit.row;
-    pvid_kapitza_estimator_q31 estimator;
-    rows.reference = 0;
-    assert_int_equal(pvid_kapitza_estimator_init_q31(&estimator, &strong_unit.estimator, &rows), PVID_OK);
-    const double w = ldexp(estimator.p[0], -PVID_KAPITZA_W_BITS);
-    const double d1 = ldexp(estimator.p[1], -24 - rows.finer[0]);
-    const double d2 = ldexp(estimator.p[2], -25 - rows.finer[1]);
-    for (size_t k = 0; k < 8u; k++) {
-        const size_t i = k % 4u;
-        const double g = w + ((k < 4u) ? 0.0 : 0.5);
-        const double terms[] = {w, w * w, d1 * pow(g, 3.0), d2 * pow(g, 4.0)};
-        const double told[] = {w, 2.0 * w * w, 3.0 * w * d1 * g * g, 4.0 * w * d2 * pow(g, 3.0)};
-        int32_t row[PVID_KAPITZA_ROW_Q31] = {0};
-        int32_t gradient[PVID_KAPITZA_P];
-        int32_t e;
-        row[places[i]] = -50 * UNIT;
-        row[PVID_KAPITZA_ROW_G] = (k < 4u) ? 0 : ((int32_t)1 << (PVID_KAPITZA_RATE_BITS - 1));
-        assert_true(pvid_kapitza_estimator_innovate_q31(&estimator, row, &e, gradient));
-        assert_true(fabs(e - (50.0 * UNIT * terms[i])) < 8.0); /* roundings */
-        assert_true(fabs((gradient[0] * w) + (50.0 * UNIT * told[i])) < 8.0);
-        assert_true(fabs(gradient[1] + ((i == 2u) ? (50.0 * UNIT * pow(g, 3.0)) : 0.0)) < 8.0);
-        assert_true(fabs(gradient[2] + ((i == 3u) ? (50.0 * UNIT * pow(g, 4.0)) : 0.0)) < 8.0);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -150,7 +119,6 @@ int main(void)
         cmocka_unit_test_setup(growing_scale_stays_in_range, start_again),
         cmocka_unit_test_setup(the_largest_rows_do_not_overflow, start_again),
         MISFIT_CASES,
-        cmocka_unit_test(a_term_counts_by_its_power_of_w),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

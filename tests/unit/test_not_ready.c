@@ -12,20 +12,15 @@
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
 #include "pvid/snapshot_weak_q31.h"
-#include "strong_table_q31.h"
 
 #define TICKS 5000
 
-static const float starts[3] = {31.0f, 8.0f, 5.0f};
-static const float derivatives[PVID_ORDERS] = {0.0f};
 static const float sample[2] = {0.01f, 0.001f};
 static const int32_t reading[2] = {1, 2};
 
 static pvid_weak_f32 weak;
 static pvid_weak_design_f32 design;
-static pvid_strong_f32 strong;
 static pvid_weak_q31 weak_q31;
-static pvid_strong_q31 strong_q31;
 static uint8_t image[PVID_SNAPSHOT_WEAK_F32 + PVID_SNAPSHOT_WEAK_Q31];
 
 static pvid_weak_config_f32 weak_config(void)
@@ -34,72 +29,24 @@ static pvid_weak_config_f32 weak_config(void)
     return config_of(&design);
 }
 
-static pvid_strong_config_f32 strong_config(void)
-{
-    pvid_strong_config_f32 config = {
-        .sample_rate_hz = 1000.0f,
-        .l1 = 0.3f,
-        .bank = {.half = 2, .stride = 20, .weights = pvid_five_points_f32},
-        .estimator = pvid_estimator_defaults_f32,
-    };
-    for (int i = 0; i < 3; i++) {
-        config.estimator.start[i] = starts[i];
-        config.estimator.start_sd[i] = 0.5f * starts[i];
-        config.estimator.lower[i] = starts[i] / 20.0f;
-        config.estimator.upper[i] = starts[i] * 20.0f;
-    }
-    config.estimator.row_sd = 1.0e3f;
-    return config;
-}
-
 /* Everything that one may call, on objects that are not ready. */
-static void call_all(pvid_weak_f32 *one, pvid_strong_f32 *other, pvid_weak_q31 *third, pvid_strong_q31 *fourth)
+static void call_all(pvid_weak_f32 *one, pvid_weak_q31 *other)
 {
     const pvid_weak_config_f32 config = weak_config();
-    const pvid_strong_config_f32 other_config = strong_config();
     for (int i = 0; i < TICKS; i++) {
         assert_int_equal(pvid_weak_step_f32(one, sample), PVID_NOT_READY);
-        assert_int_equal(pvid_strong_step_f32(other, 0.01f, 0.001f), PVID_NOT_READY);
-        assert_int_equal(pvid_strong_row_step_f32(other, derivatives, starts), PVID_NOT_READY);
-        assert_int_equal(pvid_weak_step_q31(third, reading), PVID_NOT_READY);
-        assert_int_equal(pvid_strong_step_q31(fourth, 1, 2), PVID_NOT_READY);
+        assert_int_equal(pvid_weak_step_q31(other, reading), PVID_NOT_READY);
     }
     pvid_weak_gap_f32(one);
-    pvid_strong_gap_f32(other);
-    pvid_weak_gap_q31(third);
-    pvid_strong_gap_q31(fourth);
+    pvid_weak_gap_q31(other);
     pvid_weak_freeze_f32(one, true);
-    pvid_strong_freeze_f32(other, true);
-    pvid_weak_freeze_q31(third, true);
-    pvid_strong_freeze_q31(fourth, true);
-
-    pvid_estimate_f32 estimate;
-    pvid_estimate_q31 estimate_q31;
-    float sums[PVID_STRONG_SUMS] = {0.0f};
-    pvid_strong_read_sums_f32(other, sums);
-    assert_float_equal(sums[0], 0.0f, 0.0f);
-    const pvid_estimate_f32 none = {.kappa = 0.0f};
-    const pvid_estimate_q31 none_q31 = {.kappa = 0};
-    memset(&estimate, 0x5A, sizeof estimate);
-    memset(&estimate_q31, 0x5A, sizeof estimate_q31);
-    pvid_strong_assess_f32(other, &estimate);
-    pvid_kapitza_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, &estimate_q31);
-    assert_memory_equal(&estimate, &none, sizeof none);
-    assert_memory_equal(&estimate_q31, &none_q31, sizeof none_q31);
-    pvid_strong_assess_f32(other, NULL);
-    pvid_kapitza_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, NULL);
+    pvid_weak_freeze_q31(other, true);
 
     memset(image, 0, sizeof image);
     assert_int_equal(pvid_snapshot_save_weak_f32(one, &config, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_strong_f32(other, &other_config, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_weak_q31(third, &kapitza_config_q31, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_strong_q31(fourth, &strong_unit, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_q31(other, &kapitza_config_q31, 1, image, sizeof image), 0);
     assert_int_equal(pvid_snapshot_restore_weak_f32(one, &config, image, sizeof image), PVID_SNAPSHOT_NOT_READY);
-    assert_int_equal(pvid_snapshot_restore_strong_f32(other, &other_config, image, sizeof image),
-                     PVID_SNAPSHOT_NOT_READY);
-    assert_int_equal(pvid_snapshot_restore_weak_q31(third, &kapitza_config_q31, image, sizeof image),
-                     PVID_SNAPSHOT_NOT_READY);
-    assert_int_equal(pvid_snapshot_restore_strong_q31(fourth, &strong_unit, image, sizeof image),
+    assert_int_equal(pvid_snapshot_restore_weak_q31(other, &kapitza_config_q31, image, sizeof image),
                      PVID_SNAPSHOT_NOT_READY);
 }
 
@@ -108,17 +55,15 @@ static void static_objects_before_init_do_nothing(void **state)
     (void)state;
     static const pvid_weak_f32 none;
     memset(&weak, 0, sizeof weak);
-    memset(&strong, 0, sizeof strong);
     memset(&weak_q31, 0, sizeof weak_q31);
-    memset(&strong_q31, 0, sizeof strong_q31);
-    call_all(&weak, &strong, &weak_q31, &strong_q31);
+    call_all(&weak, &weak_q31);
     assert_memory_equal(&weak, &none, sizeof none);
 }
 
 static void null_is_an_answer(void **state)
 {
     (void)state;
-    call_all(NULL, NULL, NULL, NULL);
+    call_all(NULL, NULL);
     assert_null(pvid_weak_estimate_f32(NULL));
     assert_null(pvid_weak_estimate_q31(NULL));
     assert_null(pvid_weak_candidate_f32(NULL));
@@ -155,33 +100,24 @@ static void init_refuses_null(void **state)
 {
     (void)state;
     const pvid_weak_config_f32 config = weak_config();
-    const pvid_strong_config_f32 other = strong_config();
+    const pvid_fir_bank_f32 five = {.half = 2, .stride = 20, .weights = pvid_five_points_f32};
     assert_int_equal(pvid_weak_init_f32(NULL, &config), PVID_BAD_POINTER);
-    assert_int_equal(pvid_strong_init_f32(NULL, &other), PVID_BAD_POINTER);
     assert_int_equal(pvid_weak_init_q31(NULL, &kapitza_config_q31), PVID_BAD_POINTER);
-    assert_int_equal(pvid_strong_init_q31(NULL, &strong_unit), PVID_BAD_POINTER);
-    assert_int_equal(pvid_estimator_init_f32(NULL, &other.estimator), PVID_BAD_POINTER);
+    assert_int_equal(pvid_estimator_init_f32(NULL, &config.estimator), PVID_BAD_POINTER);
     assert_int_equal(pvid_estimator_init_q31(NULL, &kapitza_config_q31.estimator), PVID_BAD_POINTER);
-    assert_int_equal(pvid_kapitza_estimator_init_q31(NULL, &strong_unit.estimator, &strong_unit.row), PVID_BAD_POINTER);
-    assert_int_equal(pvid_differentiator_init_f32(NULL, &other.bank, 1.0f), PVID_BAD_POINTER);
-    assert_int_equal(pvid_differentiator_init_q31(NULL, &strong_unit.bank), PVID_BAD_POINTER);
-    assert_int_equal(pvid_gate_init_f32(NULL, &other.gate, 1.0f, 1.0f, 1.0f), PVID_BAD_POINTER);
-    assert_int_equal(pvid_gate_init_q31(NULL, &strong_unit.gate, 1u, (pvid_scaled_q31){0, 0}), PVID_BAD_POINTER);
+    assert_int_equal(pvid_differentiator_init_f32(NULL, &five, 1.0f), PVID_BAD_POINTER);
+    assert_int_equal(pvid_gate_init_f32(NULL, &config.gate, 1.0f, 1.0f, 1.0f), PVID_BAD_POINTER);
+    assert_int_equal(pvid_gate_init_q31(NULL, &kapitza_config_q31.gate, 1u, (pvid_scaled_q31){0, 0}), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_f32(NULL, &config.trust, &weak.estimator), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_q31(NULL, &kapitza_config_q31.trust, &weak_q31.estimator), PVID_BAD_POINTER);
     static pvid_estimator_f32 estimator;
     static pvid_estimator_q31 estimator_q31;
     static pvid_differentiator_f32 differentiator;
-    static pvid_differentiator_q31 bank;
     static pvid_gate_f32 gate;
     static pvid_gate_q31 gate_q31;
     assert_int_equal(pvid_estimator_init_f32(&estimator, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_estimator_init_q31(&estimator_q31, NULL), PVID_BAD_POINTER);
-    assert_int_equal(pvid_kapitza_estimator_init_q31(&strong_q31.estimator, NULL, &strong_unit.row), PVID_BAD_POINTER);
-    assert_int_equal(pvid_kapitza_estimator_init_q31(&strong_q31.estimator, &strong_unit.estimator, NULL),
-                     PVID_BAD_POINTER);
     assert_int_equal(pvid_differentiator_init_f32(&differentiator, NULL, 1.0f), PVID_BAD_POINTER);
-    assert_int_equal(pvid_differentiator_init_q31(&bank, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_gate_init_f32(&gate, NULL, 1.0f, 1.0f, 1.0f), PVID_BAD_POINTER);
     assert_int_equal(pvid_gate_init_q31(&gate_q31, NULL, 1u, (pvid_scaled_q31){0, 0}), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_f32(&weak.trust, NULL, &weak.estimator), PVID_BAD_POINTER);
@@ -212,13 +148,6 @@ static void estimate_is_read_from_a_ready_object_only(void **state)
     assert_int_equal(pvid_snapshot_save_weak_f32(&weak, &config, 1, NULL, sizeof image), 0);
     assert_int_equal(pvid_snapshot_save_weak_q31(&weak_q31, NULL, 1, image, sizeof image), 0);
     assert_int_equal(pvid_snapshot_save_weak_q31(&weak_q31, &kapitza_config_q31, 1, NULL, sizeof image), 0);
-    const pvid_strong_config_f32 other = strong_config();
-    assert_int_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
-    assert_int_equal(pvid_strong_init_q31(&strong_q31, &strong_unit), PVID_OK);
-    assert_int_equal(pvid_snapshot_save_strong_f32(&strong, NULL, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_strong_f32(&strong, &other, 1, NULL, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_strong_q31(&strong_q31, NULL, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_strong_q31(&strong_q31, &strong_unit, 1, NULL, sizeof image), 0);
 }
 
 /* Whatever stood in the memory, and whatever the object was before. */
@@ -227,40 +156,26 @@ static void a_refused_init_leaves_an_object_that_does_nothing(void **state)
     (void)state;
     for (int how = 0; how < 3; how++) {
         pvid_weak_config_f32 config = weak_config();
-        pvid_strong_config_f32 other = strong_config();
-        pvid_weak_config_q31 third = kapitza_config_q31;
-        pvid_strong_config_q31 fourth = strong_unit;
+        pvid_weak_config_q31 other = kapitza_config_q31;
         if (how == 1) { /* it has been at work */
             assert_int_equal(pvid_weak_init_f32(&weak, &config), PVID_OK);
-            assert_int_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
-            assert_int_equal(pvid_weak_init_q31(&weak_q31, &third), PVID_OK);
-            assert_int_equal(pvid_strong_init_q31(&strong_q31, &fourth), PVID_OK);
+            assert_int_equal(pvid_weak_init_q31(&weak_q31, &other), PVID_OK);
         } else {
             memset(&weak, 0xFF, sizeof weak);
-            memset(&strong, 0xFF, sizeof strong);
             memset(&weak_q31, 0xFF, sizeof weak_q31);
-            memset(&strong_q31, 0xFF, sizeof strong_q31);
         }
         if (how == 2) {
             assert_int_equal(pvid_weak_init_f32(&weak, NULL), PVID_BAD_POINTER);
-            assert_int_equal(pvid_strong_init_f32(&strong, NULL), PVID_BAD_POINTER);
             assert_int_equal(pvid_weak_init_q31(&weak_q31, NULL), PVID_BAD_POINTER);
-            assert_int_equal(pvid_strong_init_q31(&strong_q31, NULL), PVID_BAD_POINTER);
         } else { /* by the field that is looked at last, and by the first */
             config.iterations = (how == 0) ? 1u : 0u;
             config.sample_rate_hz = (how == 0) ? 0.0f : config.sample_rate_hz;
-            other.gate.sigmas = (how == 0) ? 0.0f : 1.0f;
-            other.l1 = (how == 0) ? 0.0f : other.l1;
-            third.iterations = (how == 0) ? 1u : 0u;
-            third.offset = (how == 0) ? NULL : third.offset;
-            fourth.gate.sigmas = (how == 0) ? 0u : 1u;
-            fourth.u_multiplier[0] = (how == 0) ? 0 : fourth.u_multiplier[0];
+            other.iterations = (how == 0) ? 1u : 0u;
+            other.offset = (how == 0) ? NULL : other.offset;
             assert_int_not_equal(pvid_weak_init_f32(&weak, &config), PVID_OK);
-            assert_int_not_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
-            assert_int_not_equal(pvid_weak_init_q31(&weak_q31, &third), PVID_OK);
-            assert_int_not_equal(pvid_strong_init_q31(&strong_q31, &fourth), PVID_OK);
+            assert_int_not_equal(pvid_weak_init_q31(&weak_q31, &other), PVID_OK);
         }
-        call_all(&weak, &strong, &weak_q31, &strong_q31);
+        call_all(&weak, &weak_q31);
     }
 }
 
@@ -270,13 +185,10 @@ static void estimators_and_differentiators_do_nothing_either(void **state)
     static pvid_estimator_f32 estimator;
     static pvid_estimator_q31 estimator_q31;
     static pvid_differentiator_f32 differentiator;
-    static pvid_differentiator_q31 differentiator_q31;
     const float n[PVID_MAX_THETA] = {0.0f};
     const int32_t n_q31[PVID_MAX_THETA_Q31] = {0};
     const pvid_scaled_q31 g_q31[PVID_MAX_THETA_Q31] = {{0, 0}};
     float out[PVID_ORDERS];
-    int32_t d_phi[PVID_ORDERS];
-    int32_t d_y[PVID_Y_ORDERS_Q31];
     for (int i = 0; i < 2; i++) {
         pvid_estimator_f32 *self = (i == 0) ? &estimator : NULL;
         pvid_estimator_q31 *self_q31 = (i == 0) ? &estimator_q31 : NULL;
@@ -296,7 +208,6 @@ static void estimators_and_differentiators_do_nothing_either(void **state)
     }
     for (int i = 0; i < 2 * PVID_MAX_WINDOW; i++) {
         assert_false(pvid_differentiator_step_f32(&differentiator, 1.0f, out));
-        assert_false(pvid_differentiator_step_q31(&differentiator_q31, 1, 1, d_phi, d_y));
     }
 }
 

@@ -1,5 +1,6 @@
 /* Saving and restoring an identifier: it continues bit for bit, refuses what is not its own, and power may fail at
- * any byte of a save. The fixed-point core and the whole runs are in tests/core/test_snapshot.py. */
+ * any byte of a save. The fixed-point core is in test_weak_q31.c, whole runs are in
+ * tests/core/test_snapshot_weak.py. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,10 +12,9 @@
 #include "first_order.h"
 #include "number/fingerprint_numbers_f32.h"
 #include "solve/settings_q31.h"
-#include "plant.h"
 #include "pvid/pvid.h"
 
-#define ROOM ((PVID_SNAPSHOT_WEAK_F32 > PVID_SNAPSHOT_STRONG_F32) ? PVID_SNAPSHOT_WEAK_F32 : PVID_SNAPSHOT_STRONG_F32)
+#define ROOM PVID_SNAPSHOT_WEAK_F32
 
 static pvid_weak_f32 identifier;
 static pvid_weak_f32 restored;
@@ -89,49 +89,6 @@ static void a_pointer_into_the_object_points_into_the_restored_one(void **state)
         }
     }
     assert_true(seen > 0);
-}
-
-static void the_strong_form_continues(void **state)
-{
-    (void)state;
-    static pvid_strong_f32 one;
-    static pvid_strong_f32 other;
-    pvid_strong_config_f32 config = {
-        .sample_rate_hz = 1000.0f,
-        .l1 = 0.3f,
-        .bank = {.half = 2, .stride = 20, .weights = pvid_five_points_f32},
-        .estimator = pvid_estimator_defaults_f32,
-    };
-    const float start[3] = {22.0f, 12.0f, 4.0f};
-    for (int i = 0; i < 3; i++) {
-        config.estimator.start[i] = start[i];
-        config.estimator.start_sd[i] = 0.5f * start[i];
-        config.estimator.lower[i] = 0.05f * start[i];
-        config.estimator.upper[i] = 20.0f * start[i];
-    }
-    config.estimator.row_sd = 1.0e-4f;
-    assert_int_equal(pvid_strong_init_f32(&one, &config), PVID_OK);
-    plant_state plant = released_plant();
-    for (int i = 0; i < 3000; i++) {
-        double phi;
-        double y;
-        plant_step(&plant, &phi, &y);
-        (void)pvid_strong_step_f32(&one, (float)phi, (float)y);
-        if ((i % 50) == 49) {
-            /* a fresh object that has never been written to but by init */
-            memset(&other, 0xA5, sizeof other);
-            assert_int_equal(pvid_strong_init_f32(&other, &config), PVID_OK);
-            const size_t n = pvid_snapshot_save_strong_f32(&one, &config, 7, image, ROOM);
-            assert_int_equal(n, PVID_SNAPSHOT_STRONG_F32);
-            assert_int_equal(pvid_snapshot_restore_strong_f32(&other, &config, image, n), PVID_SNAPSHOT_RESTORED);
-            assert_memory_equal(&one, &other, sizeof one);
-        }
-    }
-    const size_t n = pvid_snapshot_save_strong_f32(&one, &config, 7, image, ROOM);
-    config.bank.stride = 19;
-    assert_int_equal(pvid_strong_init_f32(&other, &config), PVID_OK);
-    assert_int_equal(pvid_snapshot_restore_strong_f32(&other, &config, image, n), PVID_SNAPSHOT_OTHER_CONFIG);
-    assert_int_equal(pvid_snapshot_save_strong_f32(&one, &config, 7, image, PVID_SNAPSHOT_STRONG_F32 - 1u), 0);
 }
 
 /* ---- refusals ---- */
@@ -231,17 +188,21 @@ static void a_table_that_changed_is_another_design(void **state)
 
 static uint8_t slot[2][PVID_SNAPSHOT_WEAK_F32];
 
-/* The strong form, which has no theta, does not read y_bits. */
-static void the_format_of_rows_counts_where_there_are_rows(void **state)
+static void the_format_of_rows_counts(void **state)
 {
     (void)state;
     pvid_estimator_config_q31 one;
     memset(&one, 0, sizeof one);
     pvid_estimator_config_q31 other = one;
     other.y_bits = 3;
-    for (size_t n_theta = 0; n_theta < 3u; n_theta++) {
-        const uint32_t hash = pvid_fingerprint_estimator_q31(1u, &one, n_theta, 3);
-        assert_int_equal(hash == pvid_fingerprint_estimator_q31(1u, &other, n_theta, 3), n_theta == 0u);
+    assert_int_not_equal(pvid_fingerprint_estimator_q31(1u, &one, 2, 3),
+                         pvid_fingerprint_estimator_q31(1u, &other, 2, 3));
+    other.y_bits = 0;
+    for (int8_t i = 0; i < 4; i++) { /* of as many as there are theta */
+        other.n_bits[i] = 3;
+        assert_int_equal(
+            pvid_fingerprint_estimator_q31(1u, &one, 3, 3) == pvid_fingerprint_estimator_q31(1u, &other, 3, 3), i == 3);
+        other.n_bits[i] = 0;
     }
 }
 
@@ -335,12 +296,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_restored_run_continues_bit_for_bit_from_every_tick),
         cmocka_unit_test(a_pointer_into_the_object_points_into_the_restored_one),
-        cmocka_unit_test(the_strong_form_continues),
         cmocka_unit_test(every_damaged_byte_is_seen_and_nothing_is_changed),
         cmocka_unit_test(every_length_that_is_too_short_is_refused),
         cmocka_unit_test(snapshot_of_another_object_names_its_kind),
         cmocka_unit_test(a_table_that_changed_is_another_design),
-        cmocka_unit_test(the_format_of_rows_counts_where_there_are_rows),
+        cmocka_unit_test(the_format_of_rows_counts),
         cmocka_unit_test(slots_are_used_in_turn),
         cmocka_unit_test(generations_go_round),
         cmocka_unit_test(a_power_cut_at_any_byte_leaves_the_older_snapshot),

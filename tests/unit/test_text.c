@@ -49,7 +49,7 @@ static void test_the_names_of_version_0_1_mean_the_same(void **state)
 {
     (void)state;
     const pvid_counters counters = {.held_singular = 3, .in_dead_zone = 5};
-    assert_int_equal(PVID_BAD_ANGLE_LIMIT, 25);
+    assert_int_equal(PVID_BAD_ANGLE_LIMIT, PVID_BAD_RANGE);
     assert_int_equal(PVID_HELD_PIVOT, 4);
     assert_int_equal(counters.held_pivot, 3);
     assert_int_equal(counters.at_rest, 5);

@@ -12,7 +12,7 @@
 #include PVID_CONFIG_HEADER
 #endif
 
-/* Longest window of a differentiator [samples]: 2 * half * stride + 1. RAM: 4 bytes each, twice. */
+/* Longest window of a differentiator [samples]: 2 * half * stride + 1. RAM: 4 bytes each, in each. */
 #ifndef PVID_MAX_WINDOW
 #define PVID_MAX_WINDOW 321
 #endif
@@ -20,7 +20,7 @@
 #error "PVID_MAX_WINDOW must lie in 5..8191"
 #endif
 
-/* Largest number of entries of theta (11: the strong form of Kapitza's pendulum). */
+/* Largest number of entries of theta. */
 #ifndef PVID_MAX_THETA
 #define PVID_MAX_THETA 11
 #endif
@@ -28,7 +28,7 @@
 #error "PVID_MAX_THETA must lie in 1..32"
 #endif
 
-/* Largest number of free parameters p: of Kapitza's pendulum 3 in the strong form, 4 in the weak. */
+/* Largest number of free parameters p. */
 #ifndef PVID_MAX_P
 #define PVID_MAX_P 4
 #endif
@@ -36,8 +36,8 @@
 #error "PVID_MAX_P must lie in 3..8"
 #endif
 
-/* Largest number of entries of M, the sum of n (n + 1) / 2 over the kinds of rows, of n theta each: 36 for Kapitza's
- * weak form. RAM: 12 bytes each. */
+/* Largest number of entries of M, the sum of n (n + 1) / 2 over the kinds of rows, of n theta each. RAM: 12
+ * bytes each. */
 #ifndef PVID_MAX_MOMENTS
 #define PVID_MAX_MOMENTS 45
 #endif
@@ -69,7 +69,7 @@
 #error "PVID_MAX_ITERATIONS must lie in 1..255"
 #endif
 
-/* Largest number of entries of theta in the fixed-point core (11: the strong form). */
+/* Largest number of entries of theta in the fixed-point core. */
 #ifndef PVID_MAX_THETA_Q31
 #define PVID_MAX_THETA_Q31 11
 #endif
@@ -78,7 +78,7 @@
 #endif
 
 /* Largest number of entries of M in the fixed-point core: the sum of n (n + 1) / 2 over the kinds of rows, of n theta
- * each (66: the strong form). RAM: 12 bytes each. */
+ * each. RAM: 12 bytes each. */
 #ifndef PVID_MAX_MOMENTS_Q31
 #define PVID_MAX_MOMENTS_Q31 66
 #endif
@@ -86,7 +86,7 @@
 #error "PVID_MAX_MOMENTS_Q31 must lie in 1..496"
 #endif
 
-/* Largest number of non-zeros of d theta / d p in the fixed-point core (22: the strong form). RAM: 6 bytes each. */
+/* Largest number of non-zeros of d theta / d p in the fixed-point core. RAM: 6 bytes each. */
 #ifndef PVID_MAX_C_Q31
 #define PVID_MAX_C_Q31 22
 #endif

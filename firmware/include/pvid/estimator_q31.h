@@ -32,7 +32,7 @@ extern "C" {
 typedef struct pvid_estimator_q31 pvid_estimator_q31;
 typedef struct pvid_estimator_solve_q31 pvid_estimator_solve_q31;
 
-/* Settings; `pvid tables --core q31` computes them from a rig file. */
+/* Settings; `pvid model build` computes them for a rig. */
 typedef struct {
     const pvid_model_q31 *model;
     int32_t start[PVID_MAX_P];    /* initial p, within the bounds; p[i] in format p_bits[i] */

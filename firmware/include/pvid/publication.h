@@ -12,11 +12,11 @@
  *   - threads, several cores: neither blocks the other. With gcc and clang every access to a word is atomic, with
  *     memory fences for other cores; there is no data race in the sense of C11.
  *
- * The weak form contains a publication (pvid_weak_read_f32). The strong form computes an estimate only on request:
+ * The weak form contains a publication (pvid_weak_read_f32). The estimator computes an estimate only on request:
  *
  *   static pvid_publication_f32 shared;                     (all zeros: nothing has been published)
  *   in the context that calls step, every N ticks:
- *       pvid_estimator_assess_f32(&identifier.estimator, &estimate);
+ *       pvid_estimator_assess_f32(&estimator, &estimate);       (of a strong form NAME_strong_assess_f32)
  *       pvid_publication_put_f32(&shared, &estimate);
  *   in any context:
  *       if (pvid_publication_read_f32(&shared, &estimate, &number) && (number > 0)) ...

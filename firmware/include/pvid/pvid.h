@@ -1,7 +1,7 @@
 /* pvid.h - identifies the parameters of a mechanism on the microcontroller that drives it.
  *
- * C99, float32, static memory, no library function but sqrtf. Start with weak.h or strong.h (samples in,
- * parameters out), or with estimator.h and model.h for rows of your own model. Integers only: pvid_q31.h.
+ * C99, float32, static memory, no library function but sqrtf. Start with weak.h (samples in, parameters out), or with
+ * estimator.h and model.h for rows of your own model. Integers only: pvid_q31.h.
  */
 #ifndef PVID_PVID_H
 #define PVID_PVID_H
@@ -15,16 +15,13 @@
 #include "pvid/gate.h"
 #include "pvid/information.h"
 #include "pvid/little_endian.h"
-#include "pvid/mechanism.h"
 #include "pvid/misfit.h"
 #include "pvid/model.h"
 #include "pvid/publication.h"
 #include "pvid/refine.h"
-#include "pvid/snapshot.h"
 #include "pvid/snapshot_refine.h"
 #include "pvid/snapshot_weak.h"
 #include "pvid/status.h"
-#include "pvid/strong.h"
 #include "pvid/text.h"
 #include "pvid/trust.h"
 #include "pvid/version.h"

@@ -1,6 +1,7 @@
 /* pvid/snapshot_refine.h - snapshot_weak.h for an identifier with a second stage: both in one image.
  *
- * Usage, slots and layout as in snapshot.h. A snapshot of another model, design or setting of either stage is refused.
+ * Usage, slots and layout as in snapshot_slots.h. A snapshot of another model, design or setting of either stage is
+ * refused.
  */
 #ifndef PVID_SNAPSHOT_REFINE_H
 #define PVID_SNAPSHOT_REFINE_H

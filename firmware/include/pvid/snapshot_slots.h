@@ -1,4 +1,31 @@
-/* pvid/snapshot_slots.h - results, size and slots of snapshots, for every identifier. Usage: snapshot.h. */
+/* pvid/snapshot_slots.h - saves an identifier's state and restores it after a power cut, bit for bit.
+ *
+ * A snapshot is the identifier's memory with a header, a generation and a checksum. restore refuses a snapshot
+ * that is damaged, truncated or from another identifier, and then changes nothing. This header has what the snapshots
+ * of all identifiers have in common; the functions are in snapshot_weak.h, snapshot_weak_q31.h and snapshot_refine.h.
+ *
+ *   static uint8_t image[PVID_SNAPSHOT_WEAK_F32];
+ *   (at the start, after init:)
+ *   choice = pvid_snapshot_choose(flash_slot_0, flash_slot_1, sizeof image);
+ *   if (choice.newest >= 0)
+ *       status = pvid_snapshot_restore_weak_f32(&identifier, &config, flash_slot[choice.newest], sizeof image);
+ *   if (samples were missed) pvid_weak_gap_f32(&identifier);
+ *   (from time to time, between two ticks:)
+ *   n = pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, image, sizeof image);
+ *   write n bytes to the slot choice.next, then choose again
+ *
+ * Two slots. The slot to write is never that of the newest valid snapshot; a power cut at any byte of a write
+ * leaves that one valid. The caller writes the bytes to flash, in any order.
+ *
+ * A snapshot is valid for the same build (release, sizes, byte order, width of pointers: all in `layout`), the
+ * same form and core, the same model, design, configuration and tables. Pointers are not saved: they keep the values of
+ * init. The checksum detects accidents, not attacks. Not thread-safe: no tick during these functions.
+ *
+ * Layout of a snapshot, all numbers little-endian:
+ *    0 magic "PVSS"   4 bytes in all   8 version, that of the library   12 kind   16 layout   20 model   24 design
+ *   28 configuration   32 generation   36 the object's bytes, its pointers as 0 (NULL) or 1   and last CRC-32 of all
+ *   before it
+ */
 #ifndef PVID_SNAPSHOT_SLOTS_H
 #define PVID_SNAPSHOT_SLOTS_H
 

@@ -1,6 +1,7 @@
-/* pvid/snapshot_weak.h - snapshot.h for the weak form of compiled models: weak.h.
+/* pvid/snapshot_weak.h - snapshots of the weak form: weak.h.
  *
- * Usage, slots and layout as in snapshot.h. A snapshot of another model or design is refused with a status of its own.
+ * Usage, slots and layout as in snapshot_slots.h. A snapshot of another model or design is refused with a status of its
+ * own.
  */
 #ifndef PVID_SNAPSHOT_WEAK_H
 #define PVID_SNAPSHOT_WEAK_H

@@ -1,6 +1,7 @@
-/* pvid/snapshot_weak_q31.h - snapshot.h for the weak form in fixed point: weak_q31.h.
+/* pvid/snapshot_weak_q31.h - snapshots of the weak form in fixed point: weak_q31.h.
  *
- * Usage, slots and layout as in snapshot.h. A snapshot of another model or design is refused with a status of its own.
+ * Usage, slots and layout as in snapshot_slots.h. A snapshot of another model or design is refused with a status of its
+ * own.
  */
 #ifndef PVID_SNAPSHOT_WEAK_Q31_H
 #define PVID_SNAPSHOT_WEAK_Q31_H

@@ -12,7 +12,6 @@ typedef enum {
     PVID_BAD_MODEL,         /* NULL, larger than the PVID_MAX_ bounds, or its kinds do not divide theta */
     PVID_BAD_SAMPLE_RATE,   /* not finite or outside 1e-3..1e6 Hz */
     PVID_BAD_BANK,          /* weights of a bank: NULL, or one that is not finite */
-    PVID_BAD_LENGTH,        /* l1 not finite or not positive */
     PVID_BAD_START,         /* start not finite, not positive for a positive parameter, or out of bounds */
     PVID_BAD_START_SD,      /* not finite or not positive */
     PVID_BAD_BOUNDS,        /* not finite, lower >= upper, or lower <= 0 for a positive parameter */
@@ -45,15 +44,13 @@ typedef enum {
     PVID_BAD_WINDOW,        /* hop of a design: too short for its work, or too long */
     PVID_BAD_FUNCTIONS,     /* of a design: outside 4..PVID_MAX_FUNCTIONS */
     PVID_BAD_OVERLAP,       /* of a design: not finite or below 1 */
-    PVID_BAD_FULL_SCALE,   /* phi_max, y_max or u_max of a q31 bank or design: not positive, too large, or too large for
-                              the weights */
-    PVID_BAD_SHIFT,        /* a shift of a q31 bank, row or design: beyond 64 bits, or too small for full scale */
-    PVID_BAD_U_MULTIPLIER, /* of the q31 strong form: not positive */
-    PVID_BAD_DRIVE_TICKS,  /* of the q31 strong form: outside 1..2^30 */
-    PVID_BAD_FORMAT,       /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
-    PVID_BAD_RENEWAL,      /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
-    PVID_BAD_NEGLECTED,    /* of trust.h: outside 0..1 */
-    PVID_BAD_POINTER,      /* the object, the configuration or the bank is NULL */
+    PVID_BAD_FULL_SCALE,    /* of a sensor of a q31 form: not positive, too large, or too large for the weights */
+    PVID_BAD_SHIFT,         /* of a q31 design: beyond 64 bits, or too small for full scale */
+    PVID_BAD_DRIVE_TICKS,   /* rows_per_second of a q31 strong form: outside 1..2^30 */
+    PVID_BAD_FORMAT,        /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
+    PVID_BAD_RENEWAL,       /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
+    PVID_BAD_NEGLECTED,     /* of trust.h: outside 0..1 */
+    PVID_BAD_POINTER,       /* the object, the configuration or the bank is NULL */
     PVID_BAD_LAYOUT /* library and application were compiled with different sizes: layout.h; nothing was written */
 } pvid_status;
 

@@ -15,7 +15,7 @@ extern "C" {
 
 #define PVID_VARIANCE_RATIO_BITS 24
 
-/* Settings; `pvid tables --core q31` computes them from a rig file. See trust.h. */
+/* Settings; `pvid model build` computes them for a rig. See trust.h. */
 typedef struct {
     int32_t kappa_min;   /* least kappa and least pivot, Q30, 0..0.999 */
     int32_t se_max;      /* largest standard error of the positive parameters, relative to them, Q24, > 0 */

@@ -13,13 +13,13 @@ void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting
 /* Ends a block. Returns whether it is a misfit. */
 bool pvid_misfit_judge_f32(pvid_misfit_f32 *self);
 
-/* Adds a row: its residual e and its sensitivity, p[0] times its gradient in p[0]. Returns the rows that are left of
- * the block: it ends when there is none, and must then be judged, or deferred. */
-static inline uint32_t pvid_misfit_add_f32(pvid_misfit_f32 *self, float e, float sensitivity)
+/* Adds a row: the squares of its residual and of its sensitivity, p[0] times its gradient in p[0]. Returns the rows
+ * that are left of the block: it ends when there is none, and must then be judged, or deferred. */
+static inline uint32_t pvid_misfit_add_f32(pvid_misfit_f32 *self, float square, float signal)
 {
     const uint32_t left = (uint32_t)self->left - 1u;
-    self->rss += e * e;
-    self->signal += sensitivity * sensitivity;
+    self->rss += square;
+    self->signal += signal;
     self->left = (uint16_t)left;
     return left;
 }

@@ -83,68 +83,6 @@ static inline int64_t pvid_square_q31(int32_t a)
 /* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0; |x| < INT64_MAX. */
 int64_t pvid_scale_q31(int64_t x, int32_t s);
 
-/* A right shift of 64 bits to a result of 32: a multiplication in place of a shift across two registers. */
-#define PVID_SHIFT_DOWN_LEAST 2u
-#define PVID_SHIFT_DOWN_MOST 31u
-typedef struct {
-    uint32_t shift;
-    int32_t half; /* 2^(shift - 1) */
-    int32_t up;   /* 2^(32 - shift) */
-} pvid_shift_down_q31;
-
-static inline pvid_shift_down_q31 pvid_shift_down_by_q31(uint32_t shift)
-{
-    /* not 1 << (32 - shift): gcc would replace the multiplication by a shift and an addition */
-    const uint32_t up = ((uint32_t)1 << 31) >> (shift - 1u);
-    const pvid_shift_down_q31 down = {shift, (int32_t)((uint32_t)1 << (shift - 1u)), (int32_t)up};
-    return down;
-}
-
-/* x 2^-shift rounded half up, |.| < 2^31 by the caller's choice. */
-static inline int32_t pvid_shifted_down_q31(const pvid_shift_down_q31 *down, int64_t x)
-{
-    const int64_t above = x + down->half;
-    const int32_t high = (int32_t)pvid_floor_shift_q31(above, 32);
-    const uint32_t low = (uint32_t)((uint64_t)above & 0xFFFFFFFFu);
-    return (high * down->up) + (int32_t)(low >> down->shift);
-}
-
-/* x 2^-s rounded half up, |.| < 2^31 by the caller's choice; any s for which that holds. */
-static inline int32_t pvid_narrowed_q31(int64_t x, int32_t s)
-{
-    if ((s < (int32_t)PVID_SHIFT_DOWN_LEAST) || (s > (int32_t)PVID_SHIFT_DOWN_MOST)) {
-        return (int32_t)pvid_scale_q31(x, s);
-    }
-    const pvid_shift_down_q31 down = pvid_shift_down_by_q31((uint32_t)s);
-    return pvid_shifted_down_q31(&down, x);
-}
-
-/* *out = x 2^-s rounded half up; returns whether that is within -2^bits..2^bits - 1, else *out is left. |x| <= 2^62, s
- * up to 62, bits 29 or 30. */
-static inline bool pvid_narrows_q31(int64_t x, uint32_t s, uint32_t bits, int32_t *out)
-{
-    if ((s > PVID_SHIFT_DOWN_LEAST) && (s <= PVID_SHIFT_DOWN_MOST)) {
-        const pvid_shift_down_q31 down = pvid_shift_down_by_q31(s);
-        const int64_t above = x + down.half;
-        const int32_t high = (int32_t)pvid_floor_shift_q31(above, 32);
-        const int32_t limit = (int32_t)((uint32_t)1 << ((s + bits) - 32u));
-        if ((high >= limit) || (high < -limit)) {
-            return false;
-        }
-        *out = (high * down.up) + (int32_t)((uint32_t)((uint64_t)above & 0xFFFFFFFFu) >> s);
-        return true;
-    }
-    const int64_t y = (s > PVID_SHIFT_DOWN_MOST)
-                          ? pvid_floor_shift_q31(pvid_floor_shift_q31(x + ((int64_t)1 << (s - 1u)), 32), s - 32u)
-                          : pvid_round_shift_q31(x, s);
-    const int64_t limit = (int64_t)1 << bits;
-    if ((y >= limit) || (y < -limit)) {
-        return false;
-    }
-    *out = (int32_t)y;
-    return true;
-}
-
 /* x held within +-limit. */
 static inline int64_t pvid_clamp_q31(int64_t x, int64_t limit)
 {

@@ -9,12 +9,10 @@
 #define PVID_UNROLL _Pragma("GCC unroll 16")
 #define PVID_UNROLL_BY_TWO _Pragma("GCC unroll 2")
 #define PVID_UNROLL_BY_FOUR _Pragma("GCC unroll 4")
-#define PVID_NO_UNROLL _Pragma("GCC unroll 1") /* stays a loop: its turns are long */
 #else
 #define PVID_UNROLL
 #define PVID_UNROLL_BY_TWO
 #define PVID_UNROLL_BY_FOUR
-#define PVID_NO_UNROLL
 #endif
 
 /* Instead of `static inline`, for a function that is called with constants for which it becomes short, but looks long

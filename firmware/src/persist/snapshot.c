@@ -1,5 +1,6 @@
 #include "persist/snapshot.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 #include "pvid/crc32.h"
@@ -155,11 +156,6 @@ pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length,
         }
     }
     return status;
-}
-
-bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place)
-{
-    return image[PVID_SNAPSHOT_HEADER + place] != 0u;
 }
 
 uint32_t pvid_snapshot_layout(const uint32_t words[], size_t n)

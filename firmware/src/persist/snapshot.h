@@ -2,16 +2,13 @@
 #ifndef PVID_SNAPSHOT_SEAL_H
 #define PVID_SNAPSHOT_SEAL_H
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include "pvid/snapshot_slots.h"
 
 typedef enum {
-    PVID_SNAPSHOT_KIND_STRONG_F32 = 1,
-    /* 2 and 3 were the weak form of the pendulum alone */
-    PVID_SNAPSHOT_KIND_STRONG_Q31 = 4,
+    /* 1 to 4 were identifiers of the pendulum alone */
     PVID_SNAPSHOT_KIND_WEAK_F32 = 5,
     PVID_SNAPSHOT_KIND_WEAK_Q31 = 6,
     PVID_SNAPSHOT_KIND_REFINE_F32 = 7
@@ -21,8 +18,8 @@ typedef enum {
 typedef struct {
     pvid_snapshot_kind kind;
     uint32_t layout; /* hash of sizes and places */
-    uint32_t model;  /* hash of the compiled model; 0: it belongs to the kind */
-    uint32_t design; /* hash of the design's tables; 0: they belong to the configuration */
+    uint32_t model;  /* hash of the compiled model */
+    uint32_t design; /* hash of the design's tables */
     uint32_t config; /* hash of the configuration */
     size_t bytes;    /* of the object and of the memory saved after it */
 } pvid_snapshot_identity;
@@ -51,9 +48,6 @@ size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_iden
 /* Restores both if image[] contains an undamaged snapshot of this identity. */
 pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity,
                                            uint8_t object[], const pvid_snapshot_shape *shape, void *behind);
-
-/* Returns whether the pointer at `place` of the object was not NULL when the snapshot was taken. */
-bool pvid_snapshot_had_pointer(const uint8_t image[], size_t place);
 
 /* Hash of words that describe the object's layout, and of the machine's byte order. */
 uint32_t pvid_snapshot_layout(const uint32_t words[], size_t n);

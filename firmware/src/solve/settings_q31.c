@@ -101,7 +101,7 @@ uint32_t pvid_fingerprint_estimator_q31(uint32_t hash, const pvid_estimator_conf
     running = pvid_fingerprint_words(running, config->upper, n_p);
     running = pvid_fingerprint_formats(running, config->p_bits, n_p);
     running = pvid_fingerprint_formats(running, config->n_bits, n_theta);
-    running = pvid_fingerprint_formats(running, &config->y_bits, (n_theta > 0u) ? 1u : 0u);
+    running = pvid_fingerprint_formats(running, &config->y_bits, 1);
     running = pvid_fingerprint_words(running, &config->row_sd, 1);
     running = pvid_fnv_word(running, config->forgetting_groups);
     running = pvid_fingerprint_words(running, &config->gain, 1);

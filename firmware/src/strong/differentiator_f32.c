@@ -35,22 +35,14 @@ PVID_COLD pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, 
     return pvid_within_f32(sample_rate_hz, 1.0e-3f, 1.0e6f) ? PVID_OK : PVID_BAD_SAMPLE_RATE;
 }
 
-PVID_COLD void pvid_fir_take_bank_f32(pvid_fir_bank_f32 *own, const pvid_fir_bank_f32 *bank)
-{
-    /* One by one: the padding of a copied struct would be that of the caller's, and end in snapshots. */
-    own->half = bank->half;
-    own->stride = bank->stride;
-    own->block = (uint16_t)pvid_fir_block_f32(bank);
-    own->weights = bank->weights;
-}
-
 static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank, float sample_rate_hz)
 {
     const pvid_status status = pvid_fir_bank_is_valid_f32(bank, sample_rate_hz);
     if (status != PVID_OK) {
         return status;
     }
-    pvid_fir_take_bank_f32(&self->bank, bank);
+    self->bank = *bank;
+    self->bank.block = (uint16_t)pvid_fir_block_f32(bank);
     self->length = pvid_fir_length_f32(bank);
     const float rate = sample_rate_hz / (float)(pvid_fir_block_f32(bank) * bank->stride);
     float power = 1.0f / (float)self->bank.block;

@@ -13,9 +13,6 @@
 /* Checks a bank and a rate as pvid_differentiator_init_f32 does. */
 pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, float sample_rate_hz);
 
-/* Copies a bank whose block is at least 1. */
-void pvid_fir_take_bank_f32(pvid_fir_bank_f32 *own, const pvid_fir_bank_f32 *bank);
-
 /* Points of a bank's window. */
 static inline uint16_t pvid_fir_length_f32(const pvid_fir_bank_f32 *bank)
 {

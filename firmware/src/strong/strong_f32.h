@@ -729,10 +729,7 @@ PVID_ALWAYS_INLINE pvid_reason take(strong_f32 *self, const float in[STRONG_INPU
     }
     innovate(estimator->p, x, &row);
     const float square = square_of(&row, estimator->weight);
-    const uint32_t left = (uint32_t)self->misfit.left - 1u;
-    self->misfit.rss += square;
-    self->misfit.signal += signal_of(&row, estimator->weight, estimator->p);
-    self->misfit.left = (uint16_t)left;
+    const uint32_t left = pvid_misfit_add_f32(&self->misfit, square, signal_of(&row, estimator->weight, estimator->p));
     if (!pvid_gate_judges_f32(&self->gate, square)) {
         pvid_count_up(&estimator->counters.rejected_outlier);
         judge_misfit(self, left);

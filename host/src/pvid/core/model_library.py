@@ -17,7 +17,7 @@ from filelock import FileLock
 from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.sizes import options_of
-from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
+from pvid.core.sources import FIRMWARE, INCLUDES, REFINE_MODEL, ROOT, SRC, build_folder, core_sources
 from pvid.settings.cores import FLOAT, CoreBuild
 
 NATIVE = ROOT / "host" / "native"
@@ -110,7 +110,7 @@ def core_options(definitions: Iterable[str]) -> list[str]:
 def _core_hash() -> str:
     """Of everything in the core that may be compiled or included."""
     whole = hashlib.sha256()
-    paths = sorted([*FIRMWARE.glob("include/**/*.h"), *FIRMWARE.glob("src/**/*.[ch]"), *FIRMWARE.glob("models/**/*.h")])
+    paths = sorted([*FIRMWARE.glob("include/**/*.h"), *FIRMWARE.glob("src/**/*.[ch]"), *REFINE_MODEL.glob("**/*.h")])
     for path in [*paths, *sorted(NATIVE.glob("*.[ch]"))]:
         whole.update(path.name.encode())
         whole.update(path.read_bytes())

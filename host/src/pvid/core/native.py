@@ -15,10 +15,8 @@ from pvid.core.headers import Filled, Headers, Tables, default_library
 from pvid.core.refusals import refused
 from pvid.settings.enums import Core, Status
 from pvid.settings.record import Record
-from pvid.settings.tables import FirBankQ31
 
 Float32 = npt.NDArray[np.float32]
-Int32 = npt.NDArray[np.int32]
 
 
 class OfEstimator(NamedTuple):
@@ -97,30 +95,6 @@ class Native:
     def build(self) -> str:
         """Compiler and flags of this build."""
         return str(self.headers.ffi.string(self.library.pvid_native_build()).decode())
-
-    def arithmetic_faults(self) -> int:
-        """pvid_arithmetic_faults_f32: 0 when float32 behaves as the bits need."""
-        return int(self.library.pvid_arithmetic_faults_f32())
-
-    def derivatives_q31(
-        self, bank: FirBankQ31, phi: npt.ArrayLike, y: npt.ArrayLike
-    ) -> tuple[Int32, Int32, npt.NDArray[np.bool_]]:
-        """pvid_differentiator_q31 on counts within full scale: derivatives [ticks, 5] of phi and [ticks, 3] of y after
-        every tick, and whether there were any."""
-        ffi = self.headers.ffi
-        filled, state = self.headers.filled("pvid_fir_bank_q31", bank), ffi.new("pvid_differentiator_q31 *")
-        status = Status(
-            self.library.pvid_differentiator_init_layout_q31(
-                state, ffi.addressof(filled.struct), self.library.pvid_layout()
-            )
-        )
-        if status is not Status.OK:
-            raise PvidError(f"the core refused the bank: {status.text}")
-        counts = [np.ascontiguousarray(x, np.int32) for x in (phi, y)]
-        ticks = len(counts[0])
-        out = np.zeros((ticks, 5), np.int32), np.zeros((ticks, 3), np.int32), np.zeros(ticks, np.uint8)
-        self.library.pvid_replay_derivatives_q31(state, ticks, *map(self.headers.pointer, (*counts, *out)))
-        return out[0], out[1], out[2].astype(np.bool_)
 
 
 class Stepper:

@@ -17,7 +17,6 @@ _LARGE = 3.4e38
 # A status that is not here means the field of its name, which has no range.
 _RANGES: Mapping[Status, tuple[tuple[str, float, float], ...]] = {
     Status.BAD_SAMPLE_RATE: (("sample_rate", 1e-3, 1e6),),
-    Status.BAD_LENGTH: (("l1", 1e-30, _LARGE),),
     Status.BAD_START_SD: (
         ("start_sd", 1e-30, _LARGE),
         ("prior_sd", 1e-9, 1e9),

@@ -1,4 +1,4 @@
-"""Saved states of the C core's identifiers (pvid/snapshot.h), for tests and for looking at a board's flash."""
+"""Saved states of the C core's identifiers (pvid/snapshot_slots.h), for tests and for looking at a board's flash."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from pvid.base.user_cache import built_under
-from pvid.models.registry import DEFAULT
 
 PACKAGE = Path(__file__).resolve().parents[1]
 _IN_WHEEL = PACKAGE / "sources"
@@ -13,9 +12,9 @@ IS_CLONE = not _IN_WHEEL.is_dir()
 ROOT = PACKAGE.parents[2] if IS_CLONE else _IN_WHEEL
 FIRMWARE = ROOT / "firmware"
 SRC = FIRMWARE / "src"
-MODEL = FIRMWARE / "models" / DEFAULT  # the one that the library is built with
-PUBLIC_FOLDERS = (FIRMWARE / "include", MODEL / "include")
-FOLDERS = (*PUBLIC_FOLDERS, SRC, MODEL)
+REFINE_MODEL = FIRMWARE / "examples" / "refine_model"  # the second stage that the library is built with
+PUBLIC_FOLDERS = (FIRMWARE / "include", REFINE_MODEL)
+FOLDERS = (*PUBLIC_FOLDERS, SRC)
 PUBLIC_INCLUDES = [f"-I{folder}" for folder in PUBLIC_FOLDERS]
 INCLUDES = [f"-I{folder}" for folder in FOLDERS]
 _CORES = ("_f32", "_q31")
@@ -28,8 +27,8 @@ def build_folder() -> Path:
 
 
 def core_sources(pattern: str = "*.c") -> list[Path]:
-    """Sources of all rooms and of the mechanism whose names match `pattern`, sorted by name."""
-    return sorted([*SRC.glob(f"*/{pattern}"), *MODEL.glob(pattern)], key=lambda path: path.name)
+    """Sources of all rooms whose names match `pattern`, sorted by name."""
+    return sorted(SRC.glob(f"*/{pattern}"), key=lambda path: path.name)
 
 
 def sources_of(core: str) -> list[Path]:

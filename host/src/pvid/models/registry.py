@@ -16,7 +16,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import printable
 from pvid.models.model import Model
 
-DEFAULT = "kapitza"  # of the mechanisms with a hand-made C core: folders that define MODEL
+DEFAULT = "kapitza"  # where no mechanism is named; its folder defines MODEL
 DESCRIPTION = "mechanism.py"  # of a shipped mechanism, in its folder
 _FOLDER = Path(__file__).parent
 

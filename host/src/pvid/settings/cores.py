@@ -28,15 +28,9 @@ class CoreBuild:
     room: str = "weak"
 
 
-FLOAT = CoreBuild("f32", "float32", "replay_weak", ("_q31", "_strong_f32"))
-FIXED = CoreBuild("q31", "fixed point", "replay_weak_q31", ("_f32", "_strong_q31", "fingerprint_q31"))
-STRONG = CoreBuild(
-    "f32",
-    "float32",
-    None,
-    ("_q31", "_strong_f32", "_weak_f32", "_refine_f32", "fingerprint_f32"),
-    "strong",
-)
-STRONG_FIXED = CoreBuild("q31", "fixed point", None, ("_f32", "_strong_q31", "_weak_q31", "fingerprint_q31"), "strong")
+FLOAT = CoreBuild("f32", "float32", "replay_weak", ("_q31",))
+FIXED = CoreBuild("q31", "fixed point", "replay_weak_q31", ("_f32",))
+STRONG = CoreBuild("f32", "float32", None, ("_q31", "_weak_f32", "_refine_f32"), "strong")
+STRONG_FIXED = CoreBuild("q31", "fixed point", None, ("_f32", "_weak_q31"), "strong")
 STRONG_CORES: Mapping[str, CoreBuild] = {one.name: one for one in (STRONG, STRONG_FIXED)}
 CORES: Mapping[str, CoreBuild] = {one.name: one for one in (FLOAT, FIXED)}
