@@ -263,6 +263,48 @@ def test_before_init_and_with_null_nothing_is_done() -> None:
     assert init(identifier.state, identifier.config_pointer, layout + 1) == Status.BAD_LAYOUT
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "status"),
+    [
+        ("sample_rate_hz", np.nan, Status.BAD_SAMPLE_RATE),
+        ("sample_rate_hz", 2e6, Status.BAD_SAMPLE_RATE),
+        ("bank.half", 1, Status.BAD_HALF),
+        ("bank.half", 4096, Status.BAD_HALF),
+        ("bank.stride", 0, Status.BAD_STRIDE),
+        ("bank.stride", 4096, Status.BAD_STRIDE),
+        ("bank.weights", None, Status.BAD_BANK),
+        ("row_sd.0", 0, Status.BAD_ROW_SD),
+        ("row_sd.2", np.nan, Status.BAD_ROW_SD),
+        ("exact_every", 256, Status.BAD_DIVIDER),
+        ("estimator.divider", 0, Status.BAD_DIVIDER),
+        ("estimator.dead_zone", 1, Status.BAD_DEAD_ZONE),
+        ("estimator.start.0", np.nan, Status.BAD_START),
+        ("estimator.start_sd.5", 0, Status.BAD_START_SD),
+        ("estimator.lower.1", np.inf, Status.BAD_BOUNDS),
+        ("estimator.forgetting_s", -1, Status.BAD_FORGETTING),
+        ("estimator.feedback_hz", np.nan, Status.BAD_FEEDBACK),
+        ("estimator.law", 7, Status.BAD_LAW),
+        ("estimator.step_limit", 1, Status.BAD_STEP_LIMIT),
+        ("estimator.kappa_min", 1, Status.BAD_KAPPA_MIN),
+        ("estimator.correlation", 0.5, Status.BAD_CORRELATION),
+        ("gate.sigmas", 1, Status.BAD_GATE_SIGMAS),
+        ("gate.patience_s", -1, Status.BAD_GATE_PATIENCE),
+    ],
+)
+def test_init_names_the_field_that_it_refuses(field: str, value: float | None, status: Status) -> None:
+    config = config_of("rigid_body", weights=FIVE)
+    identifier = strong_native(strong_of("rigid_body"), config).identifier_of(config)
+    struct, (*parts, last) = identifier.config_struct, field.split(".")
+    for one in parts[:-1] if last.isdigit() else parts:
+        struct = getattr(struct, one)
+    given = identifier.native.headers.ffi.NULL if value is None else value
+    if last.isdigit():
+        getattr(struct, parts[-1])[int(last)] = given
+    else:
+        setattr(struct, last, given)
+    assert identifier.initialise() is status and not any(identifier.state_bytes)
+
+
 @pytest.mark.parametrize("weights", [FIVE, None], ids=["five points", "window"])
 def test_a_bad_sample_empties_the_window_as_a_gap_does_and_keeps_the_sums(weights: Float32 | None) -> None:
     samples, _ = recorded("rigid_body")
