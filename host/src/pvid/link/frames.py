@@ -26,6 +26,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from enum import IntEnum
+from functools import cache, cached_property
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -81,7 +82,7 @@ class Layout:
     name: str
     fields: tuple[tuple[str, str, int | None], ...]
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Bytes of the part with a fixed size."""
         return sum(_WIRE[kind][1] * count for _, kind, count in self.fields if count is not None)
@@ -154,6 +155,7 @@ class Message:
         messages[cls.TYPE] = cls
 
     @classmethod
+    @cache
     def layout(cls) -> Layout:
         """Its wire format."""
         described = tuple((f.name, f.metadata["kind"], f.metadata["count"]) for f in fields(cls))
