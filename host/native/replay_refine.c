@@ -40,8 +40,8 @@ void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_sa
     }
 }
 
-void pvid_replay_both_stages_f32(pvid_weak_f32 *self, uint32_t ticks, const float samples[], uint8_t told[],
-                                 uint8_t busy[], float weak_p[], float weak_se[], float r[], float se[],
+void pvid_replay_both_stages_f32(pvid_weak_f32 *self, uint32_t ticks, const float samples[], uint8_t reasons[],
+                                 uint8_t told[], uint8_t busy[], float weak_p[], float weak_se[], float r[], float se[],
                                  uint32_t *running_hash, uint32_t hash[])
 {
     const uint32_t n_samples = self->design->model->samples;
@@ -53,6 +53,9 @@ void pvid_replay_both_stages_f32(pvid_weak_f32 *self, uint32_t ticks, const floa
             const pvid_estimate_f32 *estimate = pvid_weak_candidate_f32(self);
             memcpy(&weak_p[(size_t)tick * PVID_REFINE_P], estimate->p, PVID_REFINE_P * sizeof weak_p[0]);
             memcpy(&weak_se[(size_t)tick * PVID_REFINE_P], estimate->se, PVID_REFINE_P * sizeof weak_se[0]);
+        }
+        if (reasons != NULL) {
+            reasons[tick] = (uint8_t)reason;
         }
         if (told != NULL) {
             told[tick] = (uint8_t)pvid_refine_reason_f32(refinement);

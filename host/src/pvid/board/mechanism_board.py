@@ -34,7 +34,7 @@ from pvid.configuration.weak import (
     with_neglected,
 )
 from pvid.core.native import Native
-from pvid.core.weak_native import RefinedIdentifier
+from pvid.core.weak_native import RefinedIdentifier, WeakIdentifier
 from pvid.link.frames import Configuration, Form
 from pvid.link.names import BoardNames, shown_of_refined
 from pvid.model.compiled import CompiledModel
@@ -214,6 +214,14 @@ class MechanismBoard(FloatBoard):
         return PrintedTwin(
             weak_sources(self.compiled, self.config.design, equations), self.configured(frame), self.refine
         )
+
+    def core_of(self, frame: Configuration) -> WeakIdentifier:
+        """The core, compiled on this machine, with the values of a Configure frame; raises as `configured`, and where
+        there is no compiler."""
+        config = self.configured(frame)
+        if self.refine is None:
+            return weak_native(self.compiled, self.config.design).identifier_of(config)
+        return weak_native(self.compiled, self.config.design, self.equations).refined_of(config, self.refine)
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the engine on this machine [ticks]."""

@@ -27,6 +27,7 @@ from pvid.configuration.weak_q31 import (
     with_neglected,
 )
 from pvid.core.native import Native
+from pvid.core.weak_native_q31 import WeakIdentifierQ31
 from pvid.design.c_tables import float_literal
 from pvid.design.weak_q31 import circle_of
 from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Count, Form, Message, Source
@@ -186,8 +187,8 @@ class MechanismBoardQ31:
             **{name: getattr(own, name) for name in _SINGLE},
         )
 
-    def twin_of(self, frame: Configuration) -> PrintedTwin:
-        """The twin with the values of a Configure frame.
+    def configured(self, frame: Configuration) -> WeakConfigQ31:
+        """The settings with the values of a Configure frame.
 
         Raises
         ------
@@ -199,8 +200,18 @@ class MechanismBoardQ31:
         own = self.config.estimator
         places: dict[str, Any] = {name: tuple(getattr(frame, name)[: len(own.start)]) for name in _PER_PARAMETER}
         single = {name: getattr(frame, name) for name in _SINGLE}
-        config = replace(self.config, estimator=replace(own, **places, **single))
-        return PrintedTwin(weak_sources_q31(self.engine.made, self.engine.parameters, self.config), config)
+        return replace(self.config, estimator=replace(own, **places, **single))
+
+    def twin_of(self, frame: Configuration) -> PrintedTwin:
+        """The twin with the values of a Configure frame; raises as `configured`."""
+        sources = weak_sources_q31(self.engine.made, self.engine.parameters, self.config)
+        return PrintedTwin(sources, self.configured(frame))
+
+    def core_of(self, frame: Configuration) -> WeakIdentifierQ31:
+        """The core, compiled on this machine, with the values of a Configure frame; raises as `configured`, and where
+        there is no compiler."""
+        library = weak_native_q31(self.engine.made, self.engine.parameters, self.config)
+        return library.identifier(estimator=self.configured(frame).estimator)
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `of_tables` gives the same board back."""
@@ -216,6 +227,8 @@ class MechanismBoardQ31:
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
+        for value in engine.values():
+            _refuse_words(value)
         compiled = rig.compiled()
         functions = weak_functions_of(compiled)
         of_jets = dict(zip(functions.jet_names, map(float, engine["jet_reach"]), strict=True))
@@ -309,6 +322,15 @@ def _written(value: Any) -> str:
             return f"[{together}]"
         case _:
             return repr(value)
+
+
+def _refuse_words(value: Any) -> None:
+    """TypeError where anything but a number would get into the C that is printed and compiled."""
+    if isinstance(value, list):
+        for one in value:
+            _refuse_words(one)
+    elif not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is no number")
 
 
 def _tuples(value: Any) -> Any:

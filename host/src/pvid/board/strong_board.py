@@ -14,7 +14,7 @@ from pvid.board.settings_text import TABLE, array_of, part_of, written
 from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_strong, files_strong_design
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
-from pvid.codegen.strong_library import sizes_of_strong, strong_native
+from pvid.codegen.strong_library import StrongModelIdentifier, sizes_of_strong, strong_native
 from pvid.codegen.strong_twin import StrongModelTwin
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.strong import strong_design
@@ -118,6 +118,12 @@ class StrongBoard(FloatBoard):
     def twin_of(self, frame: Configuration) -> StrongModelTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
         return StrongModelTwin(self.strong, self.configured(frame))
+
+    def core_of(self, frame: Configuration) -> StrongModelIdentifier:
+        """The core, compiled on this machine, with the values of a Configure frame; raises as `configured`, and where
+        there is no compiler."""
+        config = self.configured(frame)
+        return strong_native(self.strong, config).identifier_of(config)
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the core on this machine [ticks]."""

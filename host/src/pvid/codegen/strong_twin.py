@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.codegen import files_strong
 from pvid.codegen.strong import StrongFunctions
+from pvid.core.headers import Placed
 from pvid.core.refusals import refused
 from pvid.core.sizes import raised
 from pvid.core.sources import PUBLIC_FOLDERS, SRC, source
@@ -20,6 +21,7 @@ from pvid.settings.strong import StrongModelConfig
 from pvid.twin import fnv
 from pvid.twin.printer.program import printed_module
 from pvid.twin.printer.values import filled
+from pvid.twin.state import take_over
 
 _CORE = (
     *("assess_f32", "cholesky_f32", "differentiator_f32", "elementary_f32", "finite_f32"),
@@ -70,6 +72,11 @@ class StrongModelTwin:
 
     def _function(self, verb: str) -> Any:
         return getattr(self._module, f"{self._name}_{verb}_f32")
+
+    def take_over(self, placed: Sequence[Placed], running_hash: int) -> None:
+        """Goes on from the state and the running hash of a compiled identifier with the same settings."""
+        take_over(self._state, placed[0])
+        self.running_hash = running_hash
 
     def run(self, samples: npt.ArrayLike, progress: Callable[[int], None] | None = None) -> Record:
         """Steps through samples [ticks, signals]: p, sums, reason and running hash after every tick."""

@@ -24,6 +24,7 @@ from pvid.core.sources import IS_CLONE, PACKAGE, ROOT, build_folder
 HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the build makes with them
 
 Tables = dict[str, npt.NDArray[Any]]
+Placed = tuple[Any, int]  # a struct of C as a numpy record, and the address that it had
 
 # Fields of a configuration that the identifier sets, and a field with another name in Python.
 _FILLED_LATER = ("angle", "model", "update_rate_hz", "refine")
@@ -91,6 +92,7 @@ class Headers:
         space: dict[str, Any] = {}
         exec(_compiled(text), space)
         self.ffi: Any = space["ffi"]
+        self._records: dict[Any, np.dtype[Any]] = {}
 
     @staticmethod
     def of(library: Path) -> Headers:
@@ -118,7 +120,7 @@ class Headers:
         ctype = self.ffi.typeof(kind) if isinstance(kind, str) else kind
         size = self.ffi.sizeof(ctype)
         match ctype.kind:
-            case "struct":
+            case "struct" | "union":
                 names, fields = zip(*ctype.fields, strict=True)
                 formats = [self.dtype(field.type) for field in fields]
                 offsets = [field.offset for field in fields]
@@ -141,7 +143,13 @@ class Headers:
     def viewed(self, struct: Any) -> npt.NDArray[np.void]:
         """A copy of a struct as a numpy record, shape ()."""
         ctype = self.ffi.typeof(struct)
-        return np.frombuffer(self.ffi.buffer(self.ffi.addressof(struct)), self.dtype(ctype), 1)[0].copy()  # type: ignore[no-any-return]
+        if ctype not in self._records:
+            self._records[ctype] = self.dtype(ctype)
+        return np.frombuffer(self.ffi.buffer(self.ffi.addressof(struct)), self._records[ctype], 1)[0].copy()  # type: ignore[no-any-return]
+
+    def placed(self, pointer: Any) -> Placed:
+        """A copy of the struct at a pointer, with its address."""
+        return self.viewed(pointer[0]), int(self.ffi.cast("uintptr_t", pointer))
 
     def filled(self, kind: str, settings: Any) -> Filled:
         """A struct of C with the settings' attributes of its fields' names; PvidError where an integer does not fit."""

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.headers import Filled, Headers, Tables, default_library
+from pvid.core.headers import Filled, Headers, Placed, Tables, default_library
 from pvid.core.refusals import refused
 from pvid.settings.enums import Core, Status
 from pvid.settings.record import Record
@@ -179,9 +179,19 @@ class Stepper:
         return bytes(self.native.headers.ffi.buffer(self.state))
 
     @property
+    def placed(self) -> list[Placed]:
+        """Its objects in C memory."""
+        return [self.native.headers.placed(self.state)]
+
+    @property
     def estimator(self) -> Any:
         """pvid_estimator_<core> in it."""
         return self.state[0]
+
+    @property
+    def estimate(self) -> npt.NDArray[np.void]:
+        """What it publishes."""
+        return self.assess()[()]
 
     @property
     def publishes(self) -> bool:

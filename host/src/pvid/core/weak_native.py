@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.core.headers import Placed
 from pvid.core.model_library import ModelSources
 from pvid.core.native import Native, Publisher
-from pvid.settings.enums import Stage
+from pvid.settings.enums import Reason, Stage
 from pvid.settings.record import Record
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig
@@ -94,6 +95,7 @@ class RefinedRecord:
 
     Attributes
     ----------
+    reason : of the weak form, uint8 [ticks]
     told : reason of the refinement's last block, uint8 [ticks]
     busy : whether the weak form was, uint8 [ticks]
     weak_p, weak_se : estimates of the weak form, trusted or not, where they are new [ticks, p]; NaN at all others
@@ -101,6 +103,7 @@ class RefinedRecord:
     hash : running hash of both stages, uint32 [ticks]
     """
 
+    reason: npt.NDArray[np.uint8]
     told: npt.NDArray[np.uint8]
     busy: npt.NDArray[np.uint8]
     weak_p: Float32
@@ -123,6 +126,16 @@ class RefinedIdentifier(WeakIdentifier):
         super().__init__(native, config, also=(refine,), refine=self._second)
 
     @property
+    def placed(self) -> list[Placed]:
+        """Its objects in C memory: of both stages."""
+        return [*super().placed, self.native.headers.placed(self.refinement)]
+
+    @property
+    def told(self) -> Reason:
+        """Reason of the refinement's last block."""
+        return Reason(self.native.library.pvid_refine_reason_f32(self.refinement))
+
+    @property
     def refined(self) -> npt.NDArray[np.void] | None:
         """The published estimate of the refinement; None: there is none."""
         number = int(self.refinement.mark.number[0])
@@ -141,6 +154,7 @@ class RefinedIdentifier(WeakIdentifier):
         given = np.ascontiguousarray(samples, np.float32)
         p, n = len(self.refinement.weak_se), len(self.refinement.r)
         record = RefinedRecord(
+            reason=np.zeros(len(given), np.uint8),
             told=np.zeros(len(given), np.uint8),
             busy=np.zeros(len(given), np.uint8),
             weak_p=np.full((len(given), p), np.nan, np.float32),
@@ -150,7 +164,8 @@ class RefinedIdentifier(WeakIdentifier):
             hash=np.zeros(len(given), np.uint32),
         )
         arrays = (
-            given, record.told, record.busy, record.weak_p, record.weak_se, record.r, record.se, self._hash, record.hash
+            given, record.reason, record.told, record.busy, record.weak_p, record.weak_se, record.r, record.se,
+            self._hash, record.hash,
         )  # fmt: skip
         self.native.library.pvid_replay_both_stages_f32(self.state, len(given), *map(headers.pointer, arrays))
         return record

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from pvid.core.headers import Filled
 from pvid.core.model_library import ModelSources
 from pvid.core.native import Native, Publisher
+from pvid.settings.q31 import EstimatorConfigQ31
 from pvid.settings.record import Record
 from pvid.settings.weak_q31 import WeakConfigQ31
 
@@ -29,23 +30,33 @@ class WeakNativeQ31(Native):
         super().__init__(path)
         self.name, self.config, self.sources = name, config, sources
 
-    def identifier(self, start: npt.ArrayLike | None = None) -> WeakIdentifierQ31:
+    def identifier(
+        self, start: npt.ArrayLike | None = None, estimator: EstimatorConfigQ31 | None = None
+    ) -> WeakIdentifierQ31:
         """An initialised identifier.
 
         Parameters
         ----------
         start : p in the core's formats [n_p]; None: that of the configuration
+        estimator : its settings; None: those of the configuration
         """
-        return WeakIdentifierQ31(self, start)
+        return WeakIdentifierQ31(self, start, estimator)
 
 
 class WeakIdentifierQ31(Publisher):
     """The identifier: readings of every tick in counts."""
 
-    def __init__(self, native: WeakNativeQ31, start: npt.ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        native: WeakNativeQ31,
+        start: npt.ArrayLike | None = None,
+        estimator: EstimatorConfigQ31 | None = None,
+    ) -> None:
         given = getattr(native.library, f"{native.name}_settings_q31")[0]  # a constant of the library
         self._owned = native.headers.ffi.new("pvid_weak_config_q31 *", given)
         self._config = self._owned[0]
+        if estimator is not None:
+            self._config.estimator = native.headers.filled("pvid_estimator_config_q31", estimator).struct
         for place, one in enumerate([] if start is None else np.asarray(start, np.int32).tolist()):
             self._config.estimator.start[place] = one
         self.sources = native.sources

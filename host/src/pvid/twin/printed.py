@@ -13,15 +13,17 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.core.headers import Placed
 from pvid.core.model_library import NATIVE, ModelSources, core_of
 from pvid.core.refusals import refused
 from pvid.core.sources import FOLDERS
-from pvid.settings.enums import Stage, Status
+from pvid.settings.enums import Reason, Stage, Status
 from pvid.settings.record import Record
 from pvid.settings.refine import RefineConfig
 from pvid.twin import fnv
 from pvid.twin.printer.program import printed_module
 from pvid.twin.printer.values import filled, numbers
+from pvid.twin.state import take_over
 
 Progress = Callable[[int], None]
 Words = npt.NDArray[np.uint32]
@@ -151,6 +153,18 @@ class PrintedTwin:
         estimate = self.module.pvid_estimate_f32()
         stage = self.module.pvid_refine_best_f32(self.refinement, self.estimate, estimate)
         return Stage(stage), estimate
+
+    @property
+    def told(self) -> Reason:
+        """Reason of the second stage's last block."""
+        return Reason(self.module.pvid_refine_reason_f32(self.refinement))
+
+    def take_over(self, placed: Sequence[Placed], running_hash: int) -> None:
+        """Goes on from the state and the running hash of a compiled identifier with the same settings."""
+        take_over(self.state, placed[0])
+        for one in placed[1:]:
+            take_over(self.refinement, one)
+        self.running_hash = running_hash
 
     def freeze(self, frozen: bool) -> None:
         """pvid_weak_freeze_<core>."""
