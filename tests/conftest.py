@@ -40,6 +40,7 @@ SLOW = (
         "bench/hard",
         "twin/kinds_q31",
     ),
+    *("log/witness", "twin/state", "bench/verifying"),
     *("core/sizes_agree", "board/mechanism_board", "codegen/generated_q31"),
     *("core/trust_q31",),
     *("board/port", "codegen/generated_f32", "cli/readme", "core/read_while_stepping", "log/export"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -453,7 +454,12 @@ def test_verify_exit_codes(tmp_path: Path, sent: Sent, capfd: pytest.CaptureFixt
     verified(tmp_path / "wrong.pvlog", list(field_board.frames(wrong)))
     verified(tmp_path / "none.pvlog", frames[30:])
     (tmp_path / "noise").write_bytes(b"noise")
-    assert run("right.pvlog")[0] == 0
+    code, text = run("right.pvlog")
+    assert code == 0 and re.search(
+        r"computed again: \d+ ticks by the core compiled here \(.*\), \d+ ticks by the printed twin\n", text
+    )
+    code, text = run("right.pvlog", "--twin")
+    assert code == 0 and re.search(r"computed again: \d+ ticks by the printed twin\n", text)
     verified(tmp_path / "part.pvlog", [*frames[:120], *frames[121:]])
     code, text = run("part.pvlog")
     assert code == 1 and "DIFFERENT" not in text and "samples not verified" in text

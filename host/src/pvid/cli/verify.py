@@ -41,9 +41,14 @@ def _board_of(log: Path, rig_path: Path | None, model: str | None) -> EngineBoar
 @log_argument
 @log_rig
 @click.option("--model", help="The model file of a log of your own mechanism.  [default: the log's, if it is shipped]")
+@click.option("--twin", is_flag=True, help="The printed twin alone computes the whole log; this takes minutes an hour.")
 @click.option("--partial", is_flag=True, help="Exit code 0 even if only a part is verified.")
-def command(log: Path, rig_path: Path | None, model: str | None, partial: bool) -> int:
-    """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
+def command(log: Path, rig_path: Path | None, model: str | None, twin: bool, partial: bool) -> int:
+    """Computes a whole LOG again and compares every estimate and hash, bit for bit.
+
+    The core, compiled on this computer, computes the whole log, and the printed numpy twin parts of it: the begin of
+    each session, samples of the rest, and every difference. Without a C compiler, or with --twin, the twin computes it
+    all.
 
     Prints the first difference. A sample is verified if an equal hash covers it. Samples after a lost sample cannot
     be verified until the board begins another session; they are listed, and counted in the summary.
@@ -57,13 +62,15 @@ def command(log: Path, rig_path: Path | None, model: str | None, partial: bool) 
     reader = LogReader(log)
     verdict = Verdict()
     with progress_bar("verifying", None) as advance:
-        for stretch in Verifier(board, advance).stretches(reader):
+        for stretch in Verifier(board, advance, twin_alone=twin).stretches(reader):
             if verdict.stretches < _MOST_STRETCHES or stretch.difference is not None:
                 click.echo(stretch.text)
             verdict.add(stretch)
     if (more := verdict.stretches - _MOST_STRETCHES) > 0:
         click.echo(f"{more} stretches more, named here where they are DIFFERENT")
     click.echo(verdict.text)
+    if verdict.by_twin:
+        click.echo(verdict.computed)
     click.echo(reader.account.text)
     if verdict.different:
         return DIFFERENT

@@ -106,6 +106,11 @@ def core_options(definitions: Iterable[str]) -> list[str]:
     return [*_FLAGS, *definitions, *INCLUDES]
 
 
+def compiled_by() -> str:
+    """Compiler and optimisation of the libraries, for a sentence."""
+    return f"{Path(host_compiler(_WHAT)).resolve().name} {next(one for one in _FLAGS if one.startswith('-O'))}"
+
+
 @cache
 def _core_hash() -> str:
     """Of everything in the core that may be compiled or included."""

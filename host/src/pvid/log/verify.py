@@ -1,4 +1,9 @@
-"""Computes a log again with the numpy twin and compares every estimate and every hash in it, bit for bit.
+"""Computes a log again and compares every estimate and every hash in it, bit for bit.
+
+Where there is a C compiler, the core compiled on this computer computes the whole log. The printed twin computes the
+begin of a session from its own init on, then one piece of every 64 from the core's state, and each piece in which the
+core and the log differ: a difference is reported only if the twin finds it as well. If the twin finds other bits than
+the core, or there is no compiler, the twin alone computes the whole log.
 
 The log contains everything that the bits depend on: the samples from the session's first tick on, the configuration
 and the rig file, which gives the settings and tables of the board's image. After a lost sample the identifier's state
@@ -14,7 +19,8 @@ the log counts as verified.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -24,6 +30,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import StreamImage
 from pvid.compare.bits import Difference
+from pvid.core.model_library import compiled_by
 from pvid.link.frames import (
     MAX_P,
     Configuration,
@@ -40,33 +47,11 @@ from pvid.link.frames import (
     RefinedEstimate,
 )
 from pvid.log.reader import Gap, Record, Restart
-from pvid.settings.enums import Reason
-from pvid.settings.record import Record as Steps
+from pvid.log.witness import Core, CoreWitness, Twin, TwinWitness, Witness
 from pvid.twin import fnv
-from pvid.twin.printed import PrintedTwin
+from pvid.twin.printer.machine import bits
 
 Check = Estimate | EstimateQ31 | RefinedEstimate | Hash | Credit
-
-
-class EngineTwin(Protocol):
-    """PrintedTwin of the weak form, or StrongModelTwin of the strong form."""
-
-    samples: int  # of a tick
-    reach: int
-    running_hash: int
-    refinement: Any
-
-    @property
-    def n_p(self) -> int: ...
-
-    @property
-    def estimate(self) -> Any: ...
-
-    @property
-    def counters(self) -> Mapping[str, int]: ...
-
-    def run(self, samples: npt.NDArray[Any]) -> Steps:
-        """Goes on over samples [ticks, samples]."""
 
 
 class EngineBoard(Protocol):
@@ -81,11 +66,15 @@ class EngineBoard(Protocol):
     @property
     def matrix(self) -> str: ...
 
-    def twin_of(self, frame: Configuration) -> EngineTwin: ...
+    def twin_of(self, frame: Configuration) -> Twin: ...
+
+    def core_of(self, frame: Configuration) -> Core: ...
 
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
-_PIECE = 8192  # ticks that are computed at a time
+_PIECE = 2048  # ticks
+_EVERY = 64  # pieces: the twin computes the first of so many as well
+_FIRST = 16_384  # ticks of a session: and the first so many, from its own init on, at least two windows
 _UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
 
 
@@ -95,7 +84,8 @@ class Stretch:
 
     `ticks`: their number, from `first` on. `checked`: estimates and hashes that were equal, up to the `difference` if
     there is one. `verified`: ticks covered by equal checks. `open`: no check of the other ticks was due yet. `why_not`:
-    reason why nothing could be verified.
+    reason why nothing could be verified. `by_core`, `by_twin`: ticks that the compiled core and the twin computed.
+    `alone`: why the core did not.
     """
 
     segment: int
@@ -107,6 +97,9 @@ class Stretch:
     why_not: str | None = None
     verified: int = 0
     open: bool = False
+    by_core: int = 0
+    by_twin: int = 0
+    alone: str | None = None
 
     @property
     def trailing(self) -> int:
@@ -140,12 +133,18 @@ class Verdict:
     stretches: int = 0
     good: set[int] = field(default_factory=set)  # segments with a verified stretch that has no difference
     bad: set[int] = field(default_factory=set)  # with a difference, or with nothing that could be verified
+    by_core: int = 0
+    by_twin: int = 0
+    alone: str | None = None  # of the last stretch without the core
 
     def add(self, stretch: Stretch) -> None:
         """Adds the result of the next stretch."""
         self.stretches += 1
         self.samples += stretch.ticks
         self.checked += stretch.checked
+        self.by_core += stretch.by_core
+        self.by_twin += stretch.by_twin
+        self.alone = stretch.alone or self.alone
         different = stretch.difference is not None
         self.different += different
         if not different:
@@ -160,6 +159,13 @@ class Verdict:
     def left(self) -> int:
         """Samples that cannot be verified, or are not although a check of them was due."""
         return self.samples - self.verified - self.trailing
+
+    @property
+    def computed(self) -> str:
+        """In one sentence, which computed how much."""
+        core = f"{self.by_core} ticks by the core compiled here ({compiled_by()}), " if self.by_core else ""
+        why = f"; {self.alone}" if self.alone else ""
+        return f"computed again: {core}{self.by_twin} ticks by the printed twin{why}"
 
     @property
     def text(self) -> str:
@@ -223,12 +229,21 @@ class Verifier:
         What sent the log; None: nothing can be verified.
     progress
         Called with the number of ticks computed so far.
+    twin_alone
+        The twin computes everything, and the core nothing.
 
     Memory: the samples of the longest stretch.
     """
 
-    def __init__(self, board: EngineBoard | None, progress: Callable[[int], None] | None = None) -> None:
+    def __init__(
+        self,
+        board: EngineBoard | None,
+        progress: Callable[[int], None] | None = None,
+        *,
+        twin_alone: bool = False,
+    ) -> None:
         self.board = board
+        self._twin_alone = twin_alone
         self._progress = progress
         self._done = 0
         self._configurations: dict[int, Configure | ConfigureQ31] = {}
@@ -321,26 +336,22 @@ class Verifier:
             )
         if configuration is None:
             raise PvidError("the board's configuration is missing")
-        with np.errstate(all="ignore"):  # a board may send any number, in samples and in its configuration
-            twin, names = self._twin(configuration)
         samples = np.concatenate(opened.parts)
-        if samples.shape[1] != twin.samples:
-            raise PvidError(f"they are {samples.shape[1]} a tick, and the identifier takes {twin.samples}")
         checks: dict[int, list[Check]] = {}
         for tick, check in opened.checks:
             if check.session == stretch.session:
-                checks.setdefault(tick, []).append(check)
-        with np.errstate(all="ignore"):
-            recomputation = _Recomputation(twin, names, checks, stretch, self._count)
-            recomputation.run(samples)
+                checks.setdefault(tick - stretch.first, []).append(check)
+        with np.errstate(all="ignore"):  # a board may send any number, in samples and in its configuration
+            found = self._recomputed(configuration, samples, checks, stretch)
+        stretch.checked, stretch.difference = found.checked, found.difference
         if stretch.difference is not None and self._is_of_another_image(configuration):
             stretch.difference, stretch.checked = None, 0
             raise PvidError(
                 "the board's image was made for other settings or another model than the log's, or by another version"
             )
-        stretch.verified = recomputation.covered
-        allowed = _pace(configuration) + recomputation.reach
-        if recomputation.hashed and configuration.hash_every:
+        stretch.verified = found.covered
+        allowed = _pace(configuration) + found.reach
+        if found.hashed and configuration.hash_every:
             allowed = configuration.hash_every
         stretch.open = not opened.harmed and stretch.trailing <= allowed
 
@@ -357,14 +368,44 @@ class Verifier:
         if self._progress is not None and self._done // 512 > before // 512:
             self._progress(self._done)
 
-    def _twin(self, configuration: Configuration) -> tuple[_Twin, tuple[str, ...]]:
-        """The twin with the values of the configuration, and the names of p."""
+    def _recomputed(
+        self,
+        configuration: Configuration,
+        samples: npt.NDArray[Any],
+        checks: Mapping[int, list[Check]],
+        stretch: Stretch,
+    ) -> _Recomputation:
+        """With the values of the configuration."""
         board = self.board
         if board is None and configuration.form == Form.STRONG:
             raise PvidError("version 0.1 verifies logs of its own strong form; export and identify read them")
         if board is None:
             raise PvidError("the log holds no settings of an identifier: name its rig file with --rig")
-        return _Twin(board.twin_of(configuration), board.matrix, getattr(board, "shown", ())), board.p_names
+        twin = _twin_of(board, configuration)
+        if samples.shape[1] != twin.samples:
+            raise PvidError(f"they are {samples.shape[1]} a tick, and the identifier takes {twin.samples}")
+        found = _Recomputation(stretch, samples, checks, board.p_names, self._count, twin.reach)
+        witness, core = TwinWitness(twin, board), None
+        if not self._twin_alone:
+            try:  # after the twin, whose init has read every table of the log to its end
+                core = CoreWitness(board.core_of(configuration), board)
+            except (PvidError, IndexError, OverflowError) as error:
+                stretch.alone = str(error)
+        try:
+            found.run(witness, core)
+        except _OtherBitsError as error:
+            stretch.alone = str(error)
+            witness, core = TwinWitness(_twin_of(board, configuration), board), None
+            found.run(witness, None)
+        stretch.by_core, stretch.by_twin = 0 if core is None else core.ticks, witness.ticks
+        return found
+
+
+def _twin_of(board: EngineBoard, configuration: Configuration) -> Twin:
+    try:
+        return board.twin_of(configuration)
+    except (IndexError, TypeError, ValueError) as error:
+        raise PvidError(f"the settings of the identifier in the log are damaged: {error}") from error
 
 
 def _pace(configuration: Configuration) -> int:
@@ -372,177 +413,120 @@ def _pace(configuration: Configuration) -> int:
     return min((every for every in (configuration.hash_every, configuration.estimate_every) if every), default=0)
 
 
-# Called after a tick that is checked: the tick, its reason, the last reason that reports something, the running hash.
-_After = Callable[[int, int, int, int], None]
+class _OtherBitsError(Exception):
+    """The twin finds other bits than the compiled core."""
 
 
-@dataclass(frozen=True)
-class _Refined:
-    """best : the published estimate. latest : r, se, level, clash, number: of the second stage."""
+@dataclass
+class _Recomputation:
+    """Of samples [ticks, samples] of a stretch. `checks`: by the number of samples before them.
 
-    stage: int
-    best: Mapping[str, Any]
-    latest: Mapping[str, Any]
-    told: int
-
-
-class _Twin:
-    """An identifier that computes a stretch again.
-
-    Parameters
-    ----------
-    shown : refined parameters that the board sends, with a second stage
+    `checked`: estimates and hashes that were equal, up to the `difference` if there is one. `covered`: samples covered
+    by equal checks. `hashed`: the board hashes its samples. `reach`: of the identifier.
     """
 
-    def __init__(self, twin: EngineTwin, matrix: str, shown: Sequence[int]) -> None:
-        self._twin, self.matrix, self._shown = twin, matrix, shown
-        self.samples, self.reach, self.n_p = twin.samples, twin.reach, twin.n_p
+    stretch: Stretch
+    samples: npt.NDArray[Any]
+    checks: Mapping[int, list[Check]]
+    p_names: tuple[str, ...]
+    count: Callable[[int], None]
+    reach: int
+    checked: int = 0
+    covered: int = 0
+    hashed: bool = False
+    difference: Difference | None = None
 
-    def follow(
-        self, samples: npt.NDArray[Any], ticks: Sequence[int], after: _After, count: Callable[[int], None]
-    ) -> None:
-        """Steps through samples [ticks, samples] up to the last one of `ticks`; calls `after` after each of them, and
-        `count` with the number of ticks since its last call."""
-        first, verdict, reason = 0, int(Reason.WARMING_UP), int(Reason.WARMING_UP)
-        for tick in ticks:
-            while first <= tick:
-                last = min(first + _PIECE, tick + 1)
-                reasons = self._twin.run(samples[first:last]).reason
-                reported = reasons[reasons != Reason.ACCUMULATED]
-                verdict = int(reported[-1]) if len(reported) else verdict
-                reason = int(reasons[-1])
-                count(last - first)
-                first = last
-            after(tick, reason, verdict, self._twin.running_hash)
+    def __post_init__(self) -> None:
+        self._sample_hashes = fnv.sample_hashes(self.samples)
+        self._ticks = sorted(self.checks)
 
-    def estimate(self) -> Mapping[str, Any]:
-        """What the board says at present."""
-        return self._fields(self._twin.estimate)
+    def run(self, twin: TwinWitness, core: CoreWitness | None) -> None:
+        """From the session's first tick to the last check, or to the first one that is different."""
+        self.checked, self.covered, self.hashed = 0, 0, False
+        for number, first in enumerate(range(0, self._ticks[-1], _PIECE)):
+            last = min(first + _PIECE, self._ticks[-1])
+            before = None if core is None else core.state
+            self.difference, equal = self._through(core or twin, first, last)
+            again = self.difference is not None or first < max(_FIRST, 2 * self.reach) or number % _EVERY == 0
+            if core is not None and before is not None and again:
+                if twin.ticks != first:  # else its state is its own, from its own init on
+                    twin.take_over(before)
+                same = self._through(twin, first, last) == (self.difference, equal)
+                if not same or twin.running_hash != core.running_hash:
+                    at = self.stretch.first
+                    raise _OtherBitsError(
+                        f"the core compiled here computes other bits than it between ticks {at + first} and {at + last}"
+                    )
+            self.count(last - first)
+            self.checked += len(equal)
+            for tick, hashed in equal:
+                self.hashed = self.hashed or hashed
+                self.covered = max(self.covered, tick - (0 if hashed else self.reach))
+            if self.difference is not None:
+                return
 
-    def _fields(self, estimate: Any) -> Mapping[str, Any]:
-        matrix = getattr(estimate, self.matrix)
-        found = {name: getattr(estimate, name) for name in ("p", "se", "kappa", "residual_sd", "weight")}
-        return found | {self.matrix: np.reshape(np.array(matrix), (len(estimate.p), -1))}
+    def _through(self, witness: Witness, first: int, last: int) -> tuple[Difference | None, list[tuple[int, bool]]]:
+        """Goes on over samples first to last - 1, or to the first difference, which is returned with the checks that
+        were equal: the number of samples before them, and whether they cover those."""
+        equal: list[tuple[int, bool]] = []
+        due = self._ticks[bisect_right(self._ticks, first) : bisect_right(self._ticks, last)]
+        for tick in due if due and due[-1] == last else [*due, last]:
+            witness.run(self.samples[first:tick])
+            first = tick
+            for check in self.checks.get(tick, ()):
+                for variable, logged, own in self._compared(check, tick, witness):
+                    if logged != own:
+                        return Difference(self.stretch.first + tick, variable, logged, own, "log"), equal
+                equal.append((tick, isinstance(check, Hash | Credit) and check.sample_hash != 0))
+        return None, equal
 
-    @property
-    def updates(self) -> int:
-        """Steps of p."""
-        return self._twin.counters["updates"]
-
-    def refined(self) -> _Refined | None:
-        """The estimates of the second stage at the last tick; None: there is no second stage."""
-        twin = self._twin
-        if not isinstance(twin, PrintedTwin) or twin.refinement is None:
-            return None
-        (stage, best), own, state = twin.best, twin.refined, twin.refinement
-        zeros = [np.float32(0)] * len(state.linear)
-        latest = {
-            "r": [(zeros if own is None else own.r)[place] for place in self._shown],
-            "se": [(zeros if own is None else own.se)[place] for place in self._shown],
-            "level": 0.0 if own is None else own.level,
-            "clash": 0.0 if own is None else own.clash,
-            "number": 0 if own is None else state.mark.number[0],
-        }
-        return _Refined(int(stage), self._fields(best), latest, twin.module.pvid_refine_reason_f32(state))
-
-
-class _DifferentError(Exception):
-    """Ends a recomputation."""
-
-
-class _Recomputation:
-    """One run of the twin over a stretch. `covered`: samples covered by equal checks. `hashed`: the board hashes its
-    samples."""
-
-    def __init__(
-        self,
-        twin: _Twin,
-        p_names: tuple[str, ...],
-        checks: dict[int, list[Check]],
-        stretch: Stretch,
-        count: Callable[[int], None],
-    ) -> None:
-        self.twin = twin
-        self._p_names = p_names
-        self.reach = twin.reach
-        self.covered = 0
-        self.hashed = False
-        self._checks = checks
-        self._stretch = stretch
-        self._count = count
-        self._sample_hashes = np.empty(0, np.uint32)
-
-    def run(self, samples: npt.NDArray[Any]) -> None:
-        """Runs over samples [ticks, samples] from the session's first tick; writes the result into the stretch."""
-        self._sample_hashes = fnv.sample_hashes(samples)
-        ticks = sorted(done - self._stretch.first - 1 for done in self._checks)
-        try:
-            self.twin.follow(samples, ticks, self._after, self._count)
-        except _DifferentError:
-            pass
-
-    def _after(self, tick: int, reason: int, verdict: int, running: int) -> None:
-        done = self._stretch.first + tick + 1
-        for check in self._checks[done]:
-            for variable, logged, own in self._compared(check, tick, reason, verdict, running):
-                if logged != own:
-                    self._stretch.difference = Difference(done, variable, logged, own, "log")
-                    raise _DifferentError
-            self._stretch.checked += 1
-            hashed = isinstance(check, Hash | Credit) and check.sample_hash != 0
-            self.hashed = self.hashed or hashed
-            self.covered = max(self.covered, tick + 1 - (0 if hashed else self.reach))
-
-    def _compared(
-        self, check: Check, tick: int, reason: int, verdict: int, running: int
-    ) -> Iterator[tuple[str, int, int]]:
-        """Yields variable, word of the log and word of the twin."""
+    def _compared(self, check: Check, tick: int, witness: Witness) -> Iterator[tuple[str, int, int]]:
+        """Yields variable, word of the log and word of the witness."""
         if isinstance(check, Hash | Credit) and check.sample_hash != 0:
-            yield "hash of the samples", check.sample_hash, int(self._sample_hashes[tick])
+            yield "hash of the samples", check.sample_hash, int(self._sample_hashes[tick - 1])
         match check:
             case Hash():
-                yield "hash", check.hash, running
+                yield "hash", check.hash, witness.running_hash
             case Credit():
-                yield "hash", check.hash, running
-                yield "status", check.reason, reason
+                yield "hash", check.hash, witness.running_hash
+                yield "status", check.reason, witness.reason
             case Estimate() | EstimateQ31():
-                yield from self._compared_estimate(check, verdict)
+                yield from self._compared_estimate(check, witness)
             case RefinedEstimate():
-                yield from self._compared_refined(check)
+                yield from self._compared_refined(check, witness)
 
-    def _compared_estimate(self, check: Estimate | EstimateQ31, verdict: int) -> Iterator[tuple[str, int, int]]:
-        matrix = self.twin.matrix
+    def _compared_estimate(self, check: Estimate | EstimateQ31, witness: Witness) -> Iterator[tuple[str, int, int]]:
+        matrix = witness.matrix
         if not hasattr(check, matrix):
             raise PvidError("the estimates are of another core than the rig file sets")
-        own = self.twin.estimate()
-        n_p = self.twin.n_p
+        own, n_p = witness.estimate(), len(self.p_names)
         upper = tuple((a, b) for a, b in _UPPER if b < n_p)
         for i in range(n_p):
-            yield self._p_names[i], _word(check.p[i]), _word(own["p"][i])
+            yield self.p_names[i], _word(check.p[i]), _word(own["p"][i])
         logged = dict(zip(_UPPER, getattr(check, matrix), strict=True))
         for i, se in enumerate(getattr(check, "se", ())[:n_p]):  # where the matrix does not hold them
-            yield f"standard error of {self._p_names[i]}", _word(se), _word(own["se"][i])
+            yield f"standard error of {self.p_names[i]}", _word(se), _word(own["se"][i])
         for a, b in upper:
             yield (
-                f"{matrix} of {self._p_names[a]} and {self._p_names[b]}",
+                f"{matrix} of {self.p_names[a]} and {self.p_names[b]}",
                 _word(logged[a, b]),
                 _word(own[matrix][a, b]),
             )
         for name in ("kappa", "residual_sd", "weight"):
             yield name.replace("_", " "), _word(getattr(check, name)), _word(own[name])
-        yield "updates", check.updates, self.twin.updates
-        yield "status", check.reason, verdict
+        yield "updates", check.updates, witness.updates
+        yield "status", check.reason, witness.verdict
 
-    def _compared_refined(self, check: RefinedEstimate) -> Iterator[tuple[str, int, int]]:
-        own = self.twin.refined()
+    def _compared_refined(self, check: RefinedEstimate, witness: Witness) -> Iterator[tuple[str, int, int]]:
+        own = witness.refined()
         if own is None:
             raise PvidError("the estimates are of a second stage, which the rig file does not set")
-        n_p, latest = self.twin.n_p, own.latest
+        n_p, latest = len(self.p_names), own.latest
         for i in range(n_p):
-            yield f"published {self._p_names[i]}", _word(check.p[i]), _word(own.best["p"][i])
+            yield f"published {self.p_names[i]}", _word(check.p[i]), _word(own.best["p"][i])
         logged = dict(zip(_UPPER, check.covariance, strict=True))
         for a, b in ((a, b) for a, b in _UPPER if b < n_p):
-            what = f"published covariance of {self._p_names[a]} and {self._p_names[b]}"
+            what = f"published covariance of {self.p_names[a]} and {self.p_names[b]}"
             yield what, _word(logged[a, b]), _word(own.best["covariance"][a, b])
         for name in ("r", "se"):
             for i, value in enumerate(latest[name]):
@@ -557,6 +541,5 @@ class _Recomputation:
 def _word(value: Any) -> int:
     """The 32 bits of a number; all NaNs are equal."""
     if isinstance(value, float | np.floating):
-        word = np.float32(value)
-        return 0x7FC00000 if np.isnan(word) else int(word.view(np.uint32))
+        return bits(value) if value == value else 0x7FC00000  # noqa: PLR0124
     return int(value) & 0xFFFFFFFF
