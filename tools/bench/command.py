@@ -167,6 +167,12 @@ def _of_fixed(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
     return costs.fixed_tables(names, advance)
 
 
+def _of_verify(names: tuple[str, ...], ticks: int, advance: Advance) -> Tables:
+    from bench import verifying
+
+    return [("verify", verifying.HEADER, verifying.rows(names, ticks, advance))]
+
+
 _ONCE = (1, "--runs", "Of each image.")
 TABLES = (
     Table("mechanisms", "Errors in float64 beside the Cramer-Rao bound, and of imperfect rigs.", _of_mechanisms),
@@ -185,6 +191,13 @@ TABLES = (
         "Millions of ticks of every disturbance, with and without forgetting.",
         _of_longevity,
         (1_000_000, "--ticks", "Of each run."),
+    ),
+    Table(
+        "verify",
+        "What `pvid verify` takes for a long log, of each identifier that a board streams.",
+        _of_verify,
+        (3_600_000, "--ticks", "Of each log."),
+        ("kapitza", "dc_motor", "furuta", "battery_2rc"),
     ),
     Table(
         "compare-methods",
