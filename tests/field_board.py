@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from pendulum_plant import simulate, standard_sensors
+from pendulum_run import Run
 
 from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board import MechanismBoard
@@ -26,10 +27,9 @@ from pvid.board.stream_image import settings_number
 from pvid.codegen.weak_library import weak_native
 from pvid.core.weak_native import WeakIdentifier
 from pvid.link import frames as link
+from pvid.log.mechanism import LogMechanism
 from pvid.log.rig import mechanism_in
-from pvid.models.model import Mechanism
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.rig.run import Run
 from pvid.settings.enums import Reason
 from pvid.twin import fnv
 
@@ -84,7 +84,7 @@ def text() -> str:
 
 
 @cache
-def mechanism() -> Mechanism:
+def mechanism() -> LogMechanism:
     """Of its log."""
     found = mechanism_in(toml_document(text()))
     assert found is not None

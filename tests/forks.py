@@ -16,7 +16,6 @@ from importlib import import_module
 
 from pvid.cli.main import main
 from pvid.models.mechanisms import compiled_of
-from pvid.models.registry import DEFAULT
 
 IMPORTED = [
     *(f"pvid.cli.{name}" for name in ("compare", "export", "identify", "log", "model", "simulate", "verify")),
@@ -48,7 +47,7 @@ def next_command() -> bool:
 if __name__ == "__main__":
     for name in IMPORTED:
         import_module(name)
-    compiled_of(DEFAULT)
+    compiled_of("kapitza")
     gc.collect()
     gc.freeze()
     if next_command():

@@ -14,9 +14,8 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from pendulum_run import Run
 from scipy.integrate import solve_ivp
-
-from pvid.rig.run import Run
 
 Float = npt.NDArray[np.float64]
 Truth = Literal["linear", "full"]

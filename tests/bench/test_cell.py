@@ -20,7 +20,7 @@ DATA = ROOT / "tests" / "data" / "cell"
 
 @pytest.mark.parametrize("load", cell.LOADS, ids=lambda load: load.name)
 def test_record_has_the_current_of_its_load_and_the_voltage_of_a_cell(load: cell.Load) -> None:
-    recording = read_recording(DATA / f"{load.name}.csv.gz", columns=Columns(channels=cell.CHANNELS))
+    recording = read_recording(DATA / f"{load.name}.csv.gz", None, Columns(cell.CHANNELS))
     assert recording.notes == ()
     np.testing.assert_array_equal(recording.signals["i"], load.current())
     assert 3.0 < recording.signals["v"].min() < recording.signals["v"].max() < 4.2

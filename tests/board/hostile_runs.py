@@ -25,7 +25,6 @@ from pvid.configuration.weak import config_for_simulated_rig
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core.native import Native, Stepper
 from pvid.models.mechanisms import compiled_of
-from pvid.models.registry import DEFAULT
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
 from pvid.settings.parts import GateConfig
@@ -91,8 +90,8 @@ def play_engine(identifier: Stepper, run: Callable[[Samples], object], parts: It
 def play_all() -> int:
     """Every form, core and setting; returns the ticks."""
     done = 0
-    run = simulation_of(DEFAULT).run(1)
-    compiled = compiled_of(DEFAULT)
+    run = simulation_of("kapitza").run(1)
+    compiled = compiled_of("kapitza")
     config, engine = config_for_simulated_rig(compiled), engine_for_simulated_rig(compiled)
     y, phi = engine.counts_of({name: run[name][:TICKS] for name in ("phi", "y")}).T
     for in_float, in_fixed in WEAK:
@@ -102,7 +101,7 @@ def play_all() -> int:
         of_counts = replace(engine.config, estimator=replace(engine.config.estimator, **in_fixed))
         counting = weak_native_q31(engine.made, engine.parameters, of_counts).identifier()
         done += play_engine(counting, counting.run_samples, count_samples(phi, y, 2**12, 2**13))
-    recording = Recording(run["t"], {name: run[name] for name in ("y", "phi")}, simulation_of(DEFAULT).rig.sample_rate)
+    recording = Recording(run["t"], {name: run[name] for name in ("y", "phi")}, simulation_of("kapitza").rig.sample_rate)
     base = strong_design(compiled, recording)
     assert [one.name for one in base.strong.signals] == ["y", "phi"]
     for law, divider, exact_every, sigmas in STRONG:

@@ -148,7 +148,7 @@ def test_log_is_verified_and_exported_under_the_mechanisms_names(
     assert stretch.difference is None and verdict.verified == TICKS and verdict.checked == 2 * TICKS // 100
     assert "no check of them" not in stretch.text
     mechanism = mechanism_of_log(log)
-    assert set(board.p_names) <= set(mechanism.model.p_names)
+    assert board.names.parameters == mechanism.parameters
     paths = export_log(log, "csv", tmp_path / "a", mechanism)
     samples = list(csv.DictReader(paths[0].open()))
     signals = [one for one, _ in board.names.samples]
@@ -215,9 +215,9 @@ def test_page_shows_the_names_and_units_of_the_mechanism(logs: dict[str, Path]) 
         state.take(data[first : first + 5000])
     shown = json.loads(state.as_json())
     assert "weak form of dc_motor" in shown["board"] and shown["lost"] == ""
-    assert [row["symbol"] for row in shown["parameters"]] == ["R", "L", "k", "J", "b", "Tc", "i0"]
+    assert [row["name"] for row in shown["parameters"]] == ["R", "L", "k", "J", "b", "Tc", "i0"]
     assert [row["unit"] for row in shown["parameters"]][:4] == ["ohm", "H", "N*m/A", "kg*m²"]
-    assert [curve["label"] for curve in shown["motion"]] == ["V V [V]", "i i [A]", "phi phi [rad]"]
+    assert [curve["label"] for curve in shown["motion"]] == ["V [V]", "i [A]", "phi [rad]"]
     assert [len(curve["x"]) > 100 for curve in shown["motion"]] == [True] * 3
     assert len(shown["estimates"]["curves"]) == 7 and "noise of the sensors" in shown["residual"]
 

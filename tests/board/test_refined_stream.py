@@ -31,7 +31,6 @@ from pvid.log.rig import engine_text_of_log, mechanism_of_log
 from pvid.log.status import StatusLine
 from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.models.mechanisms import compiled_of
-from pvid.models.registry import MODELS
 from pvid.settings.enums import Reason, Stage
 from pvid.show.log_figure import write_log_figure
 from pvid.show.page_state import LiveState
@@ -211,12 +210,12 @@ def test_page_and_terminal_show_both_curves_and_which_is_published(log: Path, pu
         text = console.file.getvalue()  # type: ignore[attr-defined]
         curve = shown["estimates"]["curves"][0]
         assert len(curve["refinedValue"]) == len(curve["value"]) == len(shown["estimates"]["t"])
-        symbols = [row["symbol"] for row in shown["parameters"]]
+        names_shown = [row["name"] for row in shown["parameters"]]
         if first == 0:
             assert shown["stage"] == "the weak form's; the refinement: the first window of samples is not full yet"
-            assert not any(x is not None for x in curve["refinedValue"]) and "k1" not in symbols
+            assert not any(x is not None for x in curve["refinedValue"]) and "k1" not in names_shown
     assert shown["stage"] == "the refined one" and re.search(r"published +the refined one", text)
-    assert symbols == ["g*", "l2", "rho2", "w", "d1", "d2", "c", "k1", "k2", "tau"]
+    assert names_shown == ["g", "l2", "rho2", "w", "d1", "d2", "c", "k1", "k2", "tau"]
     refined = [x for x in curve["refinedValue"] if x is not None]
     assert len(refined) == (TICKS - published) // 100 + 1 and None not in curve["refinedValue"][-len(refined) :]
     assert curve["refinedLow"][-1] < refined[-1] < curve["refinedHigh"][-1]
@@ -233,7 +232,7 @@ def test_figure_shows_both_curves_and_which_is_published(log: Path, tmp_path: Pa
 
 
 def test_status_line_has_the_published_estimate(log: Path) -> None:
-    line, stream = StatusLine(io.StringIO(), MODELS["kapitza"]), LogStream()
+    line, stream = StatusLine(io.StringIO()), LogStream()
     texts = []
     for record in stream.feed(log.read_bytes()):
         line.take(record, stream.account)

@@ -30,7 +30,6 @@ from pvid.codegen.weak_library import weak_native
 from pvid.core.native import Native
 from pvid.link.frames import Estimate, upper_triangle
 from pvid.link.port import Port
-from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
 
@@ -78,15 +77,15 @@ class Standard:
 @cache
 def standard(form: str, core: str = "f32") -> Standard:
     if form == "strong":
-        strong = StrongBoard.of_shipped_rig(DEFAULT)
+        strong = StrongBoard.of_shipped_rig("kapitza")
         signals = tuple(strong.recording[:TICKS].T)
         return Standard(strong.without_recording, signals, strong.hashes(Native(), *signals))
-    rig = MechanismRig(DEFAULT, known=simulated_rig(DEFAULT).knowns)
+    rig = MechanismRig("kapitza", known=simulated_rig("kapitza").knowns)
     if core == "q31":
-        fixed = fixed_run(DEFAULT, TICKS)
+        fixed = fixed_run("kapitza", TICKS)
         board = MechanismBoardQ31(rig, fixed.engine, fixed.counts).without_recording
         return Standard(board, tuple(fixed.counts.T), mechanism_image_q31.native_hashes(fixed))
-    made = mechanism_run(DEFAULT, TICKS)
+    made = mechanism_run("kapitza", TICKS)
     own = MechanismBoard(rig, made.compiled, made.config, made.samples).without_recording
     return Standard(own, tuple(made.samples.T), mechanism_image.native_hashes(made))
 
@@ -128,7 +127,7 @@ def test_every_target_computes_the_bits_of_the_host(name: str, form: str, core: 
 
 @pytest.mark.long
 def test_a_long_run_stays_equal_on_two_boards_at_once(native: Native) -> None:
-    rig = StrongBoard.of_shipped_rig(DEFAULT)
+    rig = StrongBoard.of_shipped_rig("kapitza")
     y, phi = rig.recording[:LONG].T
     with ThreadPoolExecutor(2) as pool:
         verdicts = list(pool.map(lambda name: verify(name, rig, native, y, phi), ("mps2-an386", "virt-rv32imac")))

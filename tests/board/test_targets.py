@@ -23,7 +23,6 @@ from pvid.board.replay_image import (
 )
 from pvid.board.strong_image import hashes_of, standard_run
 from pvid.codegen.strong_twin import StrongModelTwin
-from pvid.models.registry import DEFAULT
 
 FORMS_AND_CORES = [*sizes.ALL, (sizes.REFINED, "f32")]
 TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
@@ -58,10 +57,10 @@ def expected_hashes(form: str, core: str) -> npt.NDArray[np.uint32]:
     """Running hash after every tick of the run that `pvid sizes` plays: of the weak form that of the twin, which other
     tests compare with the C core here; of the others that of the C core, since their twins are slow."""
     if form == "strong":
-        return hashes_of(standard_run(DEFAULT))
+        return hashes_of(standard_run("kapitza"))
     if core == "q31":
-        return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run(DEFAULT, long=True))
-    return mechanism_image.twin_hashes(mechanism_image.mechanism_run(DEFAULT, long=True))
+        return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run("kapitza", long=True))
+    return mechanism_image.twin_hashes(mechanism_image.mechanism_run("kapitza", long=True))
 
 
 def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -> None:
@@ -74,14 +73,14 @@ def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -
 
 @pytest.mark.ticks(short=1500, long=5000)
 def test_the_host_computes_the_bits_of_the_strong_twin(ticks: int) -> None:
-    design = standard_run(DEFAULT)
+    design = standard_run("kapitza")
     samples = design.samples[:ticks]
     assert np.array_equal(hashes_of(design)[:ticks], StrongModelTwin(design.strong, design.config).run(samples).hash)
 
 
 def test_the_host_computes_the_bits_of_the_weak_twin() -> None:
-    replay = mechanism_image.mechanism_run(DEFAULT, long=True)
-    fixed = mechanism_image_q31.fixed_run(DEFAULT, long=True)
+    replay = mechanism_image.mechanism_run("kapitza", long=True)
+    fixed = mechanism_image_q31.fixed_run("kapitza", long=True)
     assert np.array_equal(mechanism_image.native_hashes(replay), expected_hashes("weak", "f32"))
     assert np.array_equal(mechanism_image_q31.native_hashes(fixed), expected_hashes("weak", "q31"))
 
@@ -104,7 +103,7 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
 
 
 def test_the_weak_form_restarts_its_windows_alike_where_samples_are_missing() -> None:
-    replay = mechanism_image.mechanism_run(DEFAULT)
+    replay = mechanism_image.mechanism_run("kapitza")
     counts = replay.counts.copy()
     at = replay.measure_from
     counts[at : at + 7], counts[at + 900, 1] = mechanism_image.MISSING, mechanism_image.MISSING
@@ -167,7 +166,7 @@ def test_a_figure_over_its_budget_is_named(tmp_path: Path) -> None:
 
 def test_an_image_for_an_fpu_reports_the_fault_on_a_core_without_one() -> None:
     board = BOARDS["mps2-an386"]
-    outcome = run(board, engine_image(board, DEFAULT, "f32").image, TIMEOUT_S, machine="mps2-an385")
+    outcome = run(board, engine_image(board, "kapitza", "f32").image, TIMEOUT_S, machine="mps2-an385")
     assert outcome.exit_code == 112
     with pytest.raises(PvidError, match="FPU instruction and no FPU, exception 0x00000003 pc 0x"):
         parse_report(outcome.text)

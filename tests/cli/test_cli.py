@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from pendulum_plant import STANDARD_PENDULUM, simulate, standard_sensors
+from pendulum_run import write_run
 from program import pvid
 
 from pvid.cli.demo import target
-from pvid.rig.run import write_run
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from pendulum_plant import STANDARD_PENDULUM, STANDARD_RELEASE, simulate
+from pendulum_run import write_run
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
@@ -26,7 +27,6 @@ from pvid.identification.core import identify_in_c
 from pvid.log.rig_choice import rig_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.rig.run import write_run
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig

@@ -14,13 +14,13 @@ from typing import IO, Any
 
 import pytest
 from pendulum_plant import simulate
+from pendulum_run import write_run
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import format_of
 from pvid.base.replacing import replacing
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.rig.run import write_run
 
 PVID = [sys.executable, "-P", "-m", "pvid"]
 READER_GONE = 141

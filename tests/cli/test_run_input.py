@@ -16,12 +16,12 @@ import numpy.typing as npt
 import pytest
 from click.testing import CliRunner, Result
 from pendulum_plant import STANDARD_PENDULUM, simulate, standard_sensors
+from pendulum_run import Run, read_run, write_run
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.log.rig_choice import rig_of
 from pvid.rig.mechanism_file import MechanismRig, rig_path_of
-from pvid.rig.run import Run, read_run, write_run
 
 Float = npt.NDArray[np.float64]
 
@@ -201,11 +201,13 @@ def test_both_cores_and_their_twins_take_gaps_alike(run: Run, tmp_path: Path) ->
 _MEASURED = """
 import re, sys, time
 import numpy, pyarrow.csv
-from pvid.rig.run import read_run
+from pvid.rig.columns import Channel, Columns
+from pvid.rig.run import read_recording
+columns = Columns((Channel("phi", "rad"), Channel("y", "m")))
 def peak():
     return int(re.search("VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1])
 before, begin = peak(), time.process_time()
-rows = len(read_run(sys.argv[1]))
+rows = len(read_recording(sys.argv[1], None, columns))
 print(rows, peak() - before, time.process_time() - begin)
 """
 

@@ -11,7 +11,6 @@ import pytest
 
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
-from pvid.models.registry import DEFAULT
 
 AGAINST_IT = "-fno-delete-null-pointer-checks"
 COMMAND = re.compile(r"^(?:\S*ccache )?(?P<compile>.*) -MD .* -c (?P<source>\S+)$", re.MULTILINE)
@@ -36,7 +35,7 @@ def mistaken(options: list[str], source: str, folder: Path) -> set[str]:
 
 @pytest.mark.slow
 def test_no_function_is_taken_for_one_without_effect(tmp_path: Path) -> None:
-    _, tree = build_fixed_image(BOARDS["microbit"], fixed_run(DEFAULT))
+    _, tree = build_fixed_image(BOARDS["microbit"], fixed_run("kapitza"))
     said = subprocess.run(["ninja", "-C", str(tree), "-t", "commands"], capture_output=True, text=True, check=True)
     commands = list(COMMAND.finditer(said.stdout))
     assert any(match["source"].endswith("weak_finish_q31.c") for match in commands)

@@ -76,7 +76,7 @@ def by_coil(one: Recording, g: float = 4.0) -> Recording:
 
 
 def both(first: Recording, second: Recording, model: CompiledModel = SPRING) -> Recording:
-    return joined([first, second], ("A", "B"), Columns(channels=channels_of(model)))
+    return joined([first, second], ("A", "B"), Columns(channels_of(model)))
 
 
 def assert_near(answer: Analysis, truth: dict[str, float], most: float = 4.0) -> None:

@@ -17,6 +17,7 @@ import pandas
 import pyarrow.parquet
 import pytest
 from mcap.reader import make_reader
+from pendulum_run import read_run
 from program import pvid
 
 from pvid.base.errors import PvidError
@@ -24,17 +25,15 @@ from pvid.link import frames as link
 from pvid.log.export import FORMATS, export_log
 from pvid.log.file import LogWriter
 from pvid.log.live_stream import live_stream
+from pvid.log.mechanism import UNNAMED
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.rig import recording_of_log
-from pvid.log.values import UNKNOWN_RIG, Values, tables_of
-from pvid.models.model import Mechanism
-from pvid.models.registry import MODELS
-from pvid.rig.run import read_run
+from pvid.log.values import Values, tables_of
 from pvid.settings.enums import Reason
 
 TICKS = 4000
-MECHANISM = Mechanism(MODELS["kapitza"], {"l1": 0.3})
-TABLES = tables_of(MECHANISM.model)
+MECHANISM = field_board.mechanism()
+TABLES = tables_of(MECHANISM)
 
 
 @pytest.fixture(scope="module")
@@ -171,9 +170,9 @@ def test_an_export_that_fails_leaves_nothing(tmp_path: Path, log: Path) -> None:
     (tmp_path / "noise").write_bytes(b"noise")
     for form in FORMATS:
         with pytest.raises(PvidError, match="is not a log of pvid"):
-            export_log(tmp_path / "noise", form, tmp_path / "out", UNKNOWN_RIG)
+            export_log(tmp_path / "noise", form, tmp_path / "out", UNNAMED)
         with pytest.raises(PvidError, match="cannot write .*nowhere"):
-            export_log(log, form, tmp_path / "nowhere" / "out", UNKNOWN_RIG)
+            export_log(log, form, tmp_path / "nowhere" / "out", UNNAMED)
     assert [path.name for path in tmp_path.iterdir()] == ["noise"]
 
 

@@ -23,12 +23,11 @@ from pvid.base.errors import PvidError
 from pvid.link import frames as link
 from pvid.log.layout import LAYOUTS
 from pvid.log.live_stream import live_stream
+from pvid.log.mechanism import UNNAMED
 from pvid.log.reader import LogStream, Observer
-from pvid.log.values import UNKNOWN_RIG, tables_of
-from pvid.models.model import Mechanism
-from pvid.models.registry import MODELS
+from pvid.log.values import tables_of
 
-PENDULUM = Mechanism(MODELS["kapitza"], {"l1": 0.3})
+PENDULUM = field_board.mechanism()
 MOTOR = b"motor\nsample V V\nsample i A\nsample phi rad\np R ohm\np L H\np k N*m/A\np J kg*m^2\np i0"
 SUBPROTOCOL = "foxglove.sdk.v1"  # of foxglove-sdk; it refuses the older foxglove.websocket.v1
 BEGUN = 12  # messages of a run, the first samples among them
@@ -103,7 +102,7 @@ def test_a_client_gets_the_tables_with_names_units_and_times(port: int, sent: li
     assert client.info["name"] == "pvid" and "parameters" in client.info["capabilities"]
     first = next(i for i, (_, message) in enumerate(sent) if isinstance(message, link.Estimate))
     feed(server, stream, sent[:BEGUN])
-    tables = tables_of(PENDULUM.model)
+    tables = tables_of(PENDULUM)
     client.advertised(len(tables))
     assert set(client.topics) == {f"/{table}" for table in tables}
     for topic, one in client.topics.items():
@@ -132,7 +131,7 @@ def test_a_client_gets_the_tables_with_names_units_and_times(port: int, sent: li
     assert isinstance(estimate["reason"], str)
 
     last = [one for topic, _, one in got if topic == "/estimates"][-1]
-    names = [one.name for one in (*PENDULUM.model.published, *PENDULUM.model.physical)]
+    names = [one.name for one in PENDULUM.answers]
     expected = {name: last[name] for one in names for name in (one, f"{one}_se") if name in last}
     client.socket.settimeout(20)
     assert client.parameters([]) == expected and {"g", "g_se"} <= set(expected)
@@ -157,7 +156,7 @@ def test_what_the_layout_plots_is_served(port: int, sent: list[tuple[int, link.M
 
 def test_the_topics_follow_a_board_that_names_its_mechanism(port: int) -> None:
     hello = link.Hello(1, 1, 5, 0, 0, 7, 1000.0, 1e-3, 1e-3, (1.0,) * 8, "a motor")
-    server, stream = live_stream(f"foxglove://127.0.0.1:{port}", UNKNOWN_RIG), LogStream()
+    server, stream = live_stream(f"foxglove://127.0.0.1:{port}", UNNAMED), LogStream()
     feed(server, stream, [(0, hello), (0, link.Names(MOTOR)), (0, link.Status(*[0] * 11))])
     client = Client(port)
     client.advertised(4)
@@ -192,6 +191,8 @@ def test_the_command_serves_what_it_records(port: int, sent: list[tuple[int, lin
             for frame in frames[:BEGUN]:
                 line.write(frame)
             client.advertised(4)
+            client.topics.clear()
+            client.advertised(4)  # anew, as the board has named its mechanism
             client.parameters([])  # the subscription is in force
             for frame in frames[BEGUN:]:
                 line.write(frame)
@@ -223,4 +224,4 @@ def test_each_mistake_has_one_sentence(port: int, monkeypatch: pytest.MonkeyPatc
         live_stream("foxglove://127.0.0.1")
     monkeypatch.setitem(sys.modules, "foxglove", None)
     with pytest.raises(PvidError, match=r"^foxglove://h:1 needs foxglove-sdk: .* -m pip install foxglove-sdk$"):
-        live_stream("foxglove://h:1", Mechanism(PENDULUM.model))
+        live_stream("foxglove://h:1", PENDULUM)

@@ -17,18 +17,16 @@ from mcap.reader import make_reader
 
 from pvid.cli.main import commands
 from pvid.core.native import Native
-from pvid.log.board_model import mechanism_of
 from pvid.log.export import export_log
 from pvid.log.file import LogWriter
 from pvid.log.layout import LAYOUTS
 from pvid.log.live_stream import live_stream
+from pvid.log.mechanism import UNNAMED, LogMechanism, mechanism_named
 from pvid.log.reader import LogStream
-from pvid.models.model import Mechanism
-from pvid.models.registry import DEFAULT, MODELS
 
-PENDULUM = Mechanism(MODELS["kapitza"], {"l1": 0.3})
+PENDULUM = field_board.mechanism()
 MOTOR = b"motor\nsample V V\nsample i A\nsample phi rad\np R ohm\np L H\np k N*m/A\np J kg*m^2\np i0"
-MECHANISMS = [PENDULUM, Mechanism(MODELS[DEFAULT]), mechanism_of(MOTOR)]
+MECHANISMS = [PENDULUM, UNNAMED, mechanism_named(MOTOR)]
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +113,7 @@ def named(content: Any, prefix: str = "") -> Iterator[str]:
 
 
 @pytest.mark.parametrize("mechanism", MECHANISMS)
-def test_plotjuggler_can_restore_the_layout(mechanism: Mechanism) -> None:
+def test_plotjuggler_can_restore_the_layout(mechanism: LogMechanism) -> None:
     """As plot_docker.cpp and plotwidget.cpp read it: a splitter has `count` sizes and children."""
     text = LAYOUTS["plotjuggler"](mechanism)
     assert text.startswith("<?xml version='1.0' encoding='UTF-8'?>\n<root>")
@@ -159,7 +157,7 @@ def leaves(node: Any) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("mechanism", MECHANISMS)
-def test_foxglove_can_import_the_layout(mechanism: Mechanism) -> None:
+def test_foxglove_can_import_the_layout(mechanism: LogMechanism) -> None:
     """Its LayoutData: every panel of the tree has its settings, and every panel with settings is in the tree."""
     layout = json.loads(LAYOUTS["foxglove"](mechanism))
     assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
@@ -179,11 +177,10 @@ def test_foxglove_can_import_the_layout(mechanism: Mechanism) -> None:
             assert panel["xAxisVal"] == "timestamp" and len(panel["paths"]) == 1 and panel["foxglovePanelTitle"]
 
 
-def test_without_a_rigs_constants_nothing_physical_is_plotted() -> None:
-    """The exporter leaves those numbers out: they are not known."""
+def test_without_a_rigs_constants_no_output_is_plotted() -> None:
     assert "/estimates/g" in curves(LAYOUTS["plotjuggler"](PENDULUM))
-    assert "/estimates/g" not in curves(LAYOUTS["plotjuggler"](Mechanism(MODELS[DEFAULT])))
-    motor = paths(LAYOUTS["foxglove"](mechanism_of(MOTOR)))
+    assert "/estimates/g" not in curves(LAYOUTS["plotjuggler"](UNNAMED))
+    motor = paths(LAYOUTS["foxglove"](mechanism_named(MOTOR)))
     assert {"/samples.V", "/estimates.R", "/estimates.R_se", "/estimates.i0"} <= set(motor)
 
 

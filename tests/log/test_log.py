@@ -688,7 +688,7 @@ def test_the_status_line_shows_the_estimate_of_either_core(tmp_path: Path) -> No
             status.take(record, stream.account)
         told = status.line(stream.account, 1e9)
         assert told.startswith("1 samples, 0/s, lost 0, damaged 0; waiting for the link (the end); tick 160: ")
-        assert told.endswith("w 31.68 1/s^2, d1 8.8739, d2 5.6248, updated")
+        assert told.endswith("w 31.68 1/s^2, d1 8.8739, d2 5.6248, c 3.8147e-06 rad, updated")
 
 
 def test_full_disk_is_reported_with_the_content_of_the_log(tmp_path: Path, boards: Boards) -> None:

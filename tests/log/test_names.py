@@ -12,17 +12,15 @@ from bench.liar_board import PER_FRAME, LyingBoard, message
 from bench.lies import NAMED
 from pvid.base.errors import PvidError
 from pvid.link import frames as link
-from pvid.link.names import BoardNames, names_of
-from pvid.log.board_model import TAKEN, mechanism_of
+from pvid.link.names import BoardNames, Quantity
 from pvid.log.export import export_log
 from pvid.log.file import LogWriter
 from pvid.log.history import History
+from pvid.log.mechanism import TAKEN, UNNAMED, mechanism_named
 from pvid.log.reader import LogReader, Record
 from pvid.log.rig import mechanism_of_log
-from pvid.log.values import UNKNOWN_RIG, Values, tables_of
+from pvid.log.values import Values, tables_of
 from pvid.log.verify import Verifier
-from pvid.models.model import Mechanism
-from pvid.models.registry import DEFAULT, MODELS
 
 MOTOR = b"motor\nsample V V\nsample i A\nsample phi rad\np R ohm\np k N*m/A\np i0"
 OLD = Path(__file__).parents[1] / "data" / "logs" / "two_samples.pvlog"
@@ -50,18 +48,15 @@ def test_names_survive_the_way() -> None:
     assert names.text.encode() == MOTOR
     assert names.samples == (("V", "V"), ("i", "A"), ("phi", "rad"))
     assert names.parameters == (("R", "ohm"), ("k", "N*m/A"), ("i0", ""))
-    pendulum = names_of(MODELS[DEFAULT])
-    assert mechanism_of(pendulum.text.encode()).model is MODELS[DEFAULT]
-    longest = BoardNames(
-        "m" * 32, tuple((f"s{i:031d}", "u" * 24) for i in range(8)), tuple((f"p{i:031d}", "u" * 24) for i in range(8))
-    )
+    samples, p = (tuple(Quantity(f"{one}{i:031d}", "u" * 24) for i in range(8)) for one in "sp")
+    longest = BoardNames("m" * 32, samples, p)
     assert BoardNames.parse(longest.text.encode()) == longest
 
 
 @pytest.mark.parametrize("text", NAMED[:-3])
 def test_a_lie_about_names_is_refused(text: bytes) -> None:
     with pytest.raises(PvidError) as refused:
-        mechanism_of(text)
+        mechanism_named(text)
     assert str(refused.value).isprintable() and len(str(refused.value)) < 200
 
 
@@ -69,7 +64,6 @@ def test_samples_in_another_order_are_those_of_the_mechanism(tmp_path: Path) -> 
     """The engine takes the pendulum's height first."""
     board = LyingBoard()
     text = b"kapitza\nsample y m\nsample phi rad\np w 1/s^2\np d1\np d2\np c rad"
-    assert mechanism_of(text).model is MODELS[DEFAULT]
     names = board.say(message(link.Names, text=text))
     log = log_of(tmp_path / "a.pvlog", board.say(board.hello()), names, board.say(board.samples(phi=0.1, y=0.2)))
     samples = list(csv.DictReader(export_log(log, "csv", tmp_path / "a", mechanism_of_log(log))[0].open()))
@@ -77,8 +71,8 @@ def test_samples_in_another_order_are_those_of_the_mechanism(tmp_path: Path) -> 
 
 
 def test_columns_that_a_log_has_are_taken() -> None:
-    tables = tables_of(Mechanism(MODELS[DEFAULT]).model)
-    own = {one.name for one in (*MODELS[DEFAULT].channels, *MODELS[DEFAULT].answers)}
+    tables = tables_of(UNNAMED)
+    own = {one.name for one in (*UNNAMED.samples, *UNNAMED.answers)}
     common = {name for table in ("samples", "estimates") for name in tables[table]} - own
     assert TAKEN == {name for name in common if not name.endswith("_se")}
 
@@ -89,7 +83,7 @@ def test_log_of_another_mechanism_is_exported_under_its_names(tmp_path: Path) ->
     names = board.say(message(link.Names, text=MOTOR))
     log = log_of(tmp_path / "a.pvlog", board.say(hello), names, of_motor(board), board.say(board.samples(), PER_FRAME))
     mechanism = mechanism_of_log(log)
-    assert mechanism.model.name == "motor"
+    assert mechanism.name == "motor"
     paths = export_log(log, "csv", tmp_path / "a", mechanism)
     samples = list(csv.DictReader(paths[0].open()))
     assert [float(samples[7][name]) for name in ("V", "i", "phi")] == pytest.approx([0.1, 0.2, 0.3])
@@ -113,19 +107,19 @@ def test_view_follows_the_names_and_forgets_what_went_before() -> None:
     frames = [one for one in link.Decoder().feed(b"".join(sent)) if isinstance(one, link.Frame)]
     for frame in frames[:2]:
         history.take(Record(0, 1, frame.tick, frame.message))
-    assert history.samples().shape == (3, PER_FRAME) and history.model is UNKNOWN_RIG.model
+    assert history.samples().shape == (3, PER_FRAME) and history.mechanism is UNNAMED
     for frame in frames[2:]:
         history.take(Record(0, 1, frame.tick, frame.message))
-    assert history.model.name == "motor" and history.samples().shape == (4, 2 * PER_FRAME)
+    assert history.mechanism.name == "motor" and history.samples().shape == (4, 2 * PER_FRAME)
     assert history.newest["k"] == 2.0 and history.estimates("k").tolist() == [2.0, 2.0]
-    assert history.is_physical and not history.has_physical
+    assert history.is_physical and not history.mechanism.outputs
 
 
 def test_values_with_a_rig_do_not_follow_the_board(tmp_path: Path) -> None:
     board = LyingBoard()
     log = log_of(tmp_path / "a.pvlog", board.say(board.hello()), board.say(message(link.Names, text=MOTOR)))
     values = Values()
-    assert [list(values.rows(record)) for record in LogReader(log)] and values.mechanism is UNKNOWN_RIG
+    assert [list(values.rows(record)) for record in LogReader(log)] and values.mechanism is UNNAMED
 
 
 def test_log_of_the_former_schema_is_exported(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from pendulum_run import columns_of
 
 from bench.liar_board import LyingBoard
 from pvid.base.console import DIFFERENT, DONE
@@ -22,7 +23,6 @@ from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.log.reader import LogReader
 from pvid.log.text_table import TextTable
-from pvid.rig.columns import parsed
 from pvid.rig.run import read_recording
 
 ROWS = "".join(f"{5 * k},{k % 255},{512 + k % 40},{3 * k}\r\n" for k in range(400))
@@ -139,7 +139,7 @@ def test_what_a_board_prints_is_a_recording(tmp_path: Path) -> None:
         found = log(port, out, "--samples", "400", "--duration", "20")
     assert found.return_value == DONE, found.output
     assert "400 rows of t, duty, current and counts" in found.output
-    recording = read_recording(out, None, parsed("t=t:ms,y=duty,phi=counts"))
+    recording = read_recording(out, None, columns_of("t=t:ms,y=duty,phi=counts"))
     assert len(recording) == 400 and recording.sample_rate == pytest.approx(200.0)
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
     again = log(port, out)

@@ -11,9 +11,10 @@ import numpy.typing as npt
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pendulum_run import Run, read_run, write_run
 
 from pvid.base.errors import PvidError
-from pvid.rig.run import MIN_ROWS, Run, read_run, write_run
+from pvid.rig.run import MIN_ROWS
 
 Float = npt.NDArray[np.float64]
 

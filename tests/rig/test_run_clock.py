@@ -11,10 +11,10 @@ import numpy.typing as npt
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from pendulum_run import Run, read_run
 
 from pvid.base.errors import PvidError
 from pvid.rig.gaps import bridge
-from pvid.rig.run import Run, read_run
 
 Float = npt.NDArray[np.float64]
 
@@ -152,7 +152,7 @@ def test_long_gaps_stay_empty(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.isnan(run.y), missing)
     assert "missing samples: 5 of 10000, in 1 gap (first at 2 s, longest 0.005 s), interpolated" in run.notes
     assert any("missing samples: 300 of 10000" in note and "starts its windows again" in note for note in run.notes)
-    whole = run.whole()
+    whole = Run.of(run.recording.whole())
     assert len(whole) == 5700 and whole.t[0] == pytest.approx(4.3) and np.isfinite(whole.phi).all()
     assert whole.notes[-1] == "used is the longest stretch without a gap: 4.3 s to 9.999 s"
 

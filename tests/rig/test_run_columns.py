@@ -12,10 +12,9 @@ import pyarrow.parquet
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pendulum_run import columns_of, read_run
 
 from pvid.base.errors import PvidError
-from pvid.rig.columns import Columns
-from pvid.rig.run import read_run
 
 ROWS = 60
 T = np.arange(ROWS) / 1000.0
@@ -40,7 +39,7 @@ def written(folder: Path, content: str | bytes, name: str = "run.csv") -> Path:
 
 
 def assert_is_the_run(path: Path, columns: str | None = None) -> None:
-    run = read_run(path, columns=None if columns is None else Columns.parse(columns))
+    run = read_run(path, text=columns)
     np.testing.assert_array_equal(run.t, T)
     np.testing.assert_array_equal(run.phi, PHI)
     np.testing.assert_array_equal(run.y, Y)
@@ -123,7 +122,7 @@ def test_columns_of_other_names_and_units(suffix: str, tmp_path: Path) -> None:
         np.savez(path, **columns)  # type: ignore[arg-type]
     else:
         pyarrow.parquet.write_table(pyarrow.table(columns), path)
-    run = read_run(path, columns=Columns.parse("t=time_ms:ms,phi=angle_deg:deg,y=h:mm"))
+    run = read_run(path, text="t=time_ms:ms,phi=angle_deg:deg,y=h:mm")
     np.testing.assert_array_equal(run.t, T)  # milliseconds are divided, so that they give the bits of decimals
     np.testing.assert_allclose(run.phi, PHI, rtol=1e-15)  # two roundings there and back
     np.testing.assert_allclose(run.y, Y, rtol=1e-15)
@@ -150,7 +149,7 @@ def test_columns_of_other_names_and_units(suffix: str, tmp_path: Path) -> None:
     ],
 )
 def test_units(text: str, signal: str, one: float) -> None:
-    columns = Columns.parse(text)
+    columns = columns_of(text)
     assert columns[signal].in_si(np.array([1.0]))[0] == pytest.approx(one, rel=1e-15)
     assert columns[signal].name == ("time: h" if ": h" in text else "a")
 
@@ -174,7 +173,7 @@ def test_units(text: str, signal: str, one: float) -> None:
 )
 def test_a_wrong_map_is_one_sentence(text: str, part: str) -> None:
     with pytest.raises(PvidError, match="^--columns: ") as caught:
-        Columns.parse(text)
+        columns_of(text)
     assert part in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -182,7 +181,7 @@ def test_a_wrong_map_is_one_sentence(text: str, part: str) -> None:
 @settings(deadline=None)
 def test_any_map_is_read_or_refused_in_a_sentence(text: str) -> None:
     try:
-        Columns.parse(text)
+        columns_of(text)
     except PvidError as error:
         assert str(error).isprintable()
 
@@ -210,7 +209,7 @@ def test_missing_columns_are_listed_with_the_text_that_names_them(header: str, s
         assert f"'{name}'" in sentence
     if "NAME" not in suggested:
         typed = suggested.removeprefix("--columns ").strip("'")
-        read_run(path, columns=Columns.parse(typed.replace(":ms", ":s").replace(":us", ":s")))
+        read_run(path, text=typed.replace(":ms", ":s").replace(":us", ":s"))
 
 
 def test_a_file_without_names_is_read_by_place(tmp_path: Path) -> None:
@@ -218,7 +217,7 @@ def test_a_file_without_names_is_read_by_place(tmp_path: Path) -> None:
     assert_is_the_run(written(tmp_path, table(header="a,b,c")), "t=1,phi=2,y=c")
     path = written(tmp_path, table(header=""))
     with pytest.raises(PvidError, match="no column '4' for y among '1', '2', '3'"):
-        read_run(path, columns=Columns.parse("t=1,phi=2,y=4"))
+        read_run(path, text="t=1,phi=2,y=4")
 
 
 @pytest.mark.parametrize("cut", range(2, 27))

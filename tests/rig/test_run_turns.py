@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from pendulum_run import read_run
 
 from pvid.base.errors import PvidError
-from pvid.rig.run import read_run
 from pvid.rig.turns import counted_on, joined
 
 Float = npt.NDArray[np.float64]
@@ -106,12 +106,11 @@ def test_encoder_that_is_zeroed_on_the_way_is_not_joined() -> None:
 
 
 def test_run_of_wrapping_counts_is_read_with_a_note(tmp_path: Path) -> None:
-    from pvid.rig.columns import Columns
 
     counts = np.rint(SWING / LSB).astype(int) % 4096
     path = tmp_path / "run.csv"
     path.write_text("t,count,y\n" + "".join(f"{t:.3f},{c},0.1\n" for t, c in zip(T, counts, strict=True)))
-    run = read_run(path, columns=Columns.parse("phi=count:rev/4096"))
+    run = read_run(path, text="phi=count:rev/4096")
     np.testing.assert_allclose(run.phi, SWING, rtol=0, atol=1e-12)
     assert len(run.notes) == 1 and "count jumps by a turn" in run.notes[0]
 

@@ -9,14 +9,13 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.models.model import Channel
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.run import NUMBER, Recording, recording_of_arrays
 from pvid.rig.together import joined, names_of
 
 Float = npt.NDArray[np.float64]
 
-COLUMNS = Columns(channels=(Channel("F", "N", "F", held=True), Channel("x", "m", "x")))
+COLUMNS = Columns((Channel("F", "N", held=True), Channel("x", "m")))
 
 
 def motion(t: Float) -> Float:

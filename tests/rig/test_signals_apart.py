@@ -7,15 +7,14 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.models.model import Channel
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.run import Recording, recording_of_arrays
 
 Float = npt.NDArray[np.float64]
 
 RATE = 500.0
 LSB = 1e-5
-COLUMNS = Columns(channels=(Channel("F", "N", "F", held=True), Channel("x", "m", "x")))
+COLUMNS = Columns((Channel("F", "N", held=True), Channel("x", "m")))
 
 
 def motion(t: Float) -> Float:

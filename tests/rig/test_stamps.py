@@ -9,13 +9,12 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.models.model import Channel
-from pvid.rig.columns import Columns, parsed
+from pvid.rig.columns import Channel, Columns, parsed
 from pvid.rig.run import Recording, recording_of_arrays
 
 Float = npt.NDArray[np.float64]
 
-CHANNELS = (Channel("F", "N", "F", held=True), Channel("x", "m", "x"))
+CHANNELS = (Channel("F", "N", held=True), Channel("x", "m"))
 T = np.arange(4000) / 500.0
 US = np.rint(T * 1e6).astype(np.int64)
 FORCE = np.sin(3.0 * T).round(3)
@@ -120,5 +119,5 @@ def test_coarse_stamps_of_a_mechanism_at_rest_repeat_no_row() -> None:
     """Rows alike at one stamp: t is rounded to 10 ms, and nothing moves in the first half."""
     resting = np.where(T < 4.0, 0.0, X)
     data = {"t": np.floor(T * 100 + 1e-6) / 100, "F": np.where(T < 4.0, 0.0, FORCE), "x": resting}
-    found = recording_of_arrays(data, None, Columns(channels=CHANNELS))
+    found = recording_of_arrays(data, None, Columns(CHANNELS))
     assert len(found) == T.size and found.sample_rate == pytest.approx(500.0, rel=1e-3)

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.models.model import Channel
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.csv_table import read_csv
 from pvid.rig.table import Table
 
-CHANNELS = (Channel("F", "N", "force"), Channel("x", "m", "place"))
+CHANNELS = (Channel("F", "N"), Channel("x", "m"))
 ROWS = 120
 T = np.round(np.arange(ROWS) * 0.002, 3)
 F = np.round(5.0 * np.sin(9.0 * T) + 0.4, 3)
@@ -31,7 +30,7 @@ def of(*lines: str) -> str:
 def table(path: Path, content: str | bytes, columns: str | None = None) -> Table:
     file = path / "run.csv"
     file.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return read_csv(file, Columns(channels=CHANNELS) if columns is None else Columns.parse(columns, CHANNELS))
+    return read_csv(file, Columns(CHANNELS) if columns is None else Columns.parse(columns, CHANNELS))
 
 
 def assert_same(found: Table, left_out: tuple[int, ...] = (), rtol: float = 0.0) -> None:
@@ -477,12 +476,12 @@ def test_an_index_in_brackets_is_no_unit(tmp_path: Path) -> None:
     ],
 )
 def test_units_of_every_dimension(si: str, unit: str, one: float) -> None:
-    columns = Columns.parse(f"n=n:{unit}", (Channel("n", si, "n"),))
+    columns = Columns.parse(f"n=n:{unit}", (Channel("n", si),))
     assert columns["n"].in_si(np.ones(1))[0] == pytest.approx(one, rel=1e-15)
 
 
 def test_temperatures_have_an_offset() -> None:
-    kelvin = (Channel("T", "K", "temperature"),)
+    kelvin = (Channel("T", "K"),)
     assert Columns.parse("T=T:degC", kelvin)["T"].in_si(np.array([20.0]))[0] == 293.15
     for unit, part in (("-degC", "offset"), ("degC/10", "offset"), ("V", "'V' is no unit of T; it is K, degC or")):
         with pytest.raises(PvidError, match=re.escape(part)):

@@ -30,11 +30,10 @@ from mcap_ros2.writer import Writer as Ros2Writer
 
 from pvid.api.data import named
 from pvid.base.errors import PvidError
-from pvid.models.model import Channel
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.run import Recording, read_recording, recording_of_arrays
 
-CHANNELS = (Channel("F", "N", "force"), Channel("x", "m", "place"))
+CHANNELS = (Channel("F", "N"), Channel("x", "m"))
 ROWS = 200
 T = np.arange(ROWS) * 0.002
 F = np.round(5.0 * np.sin(9.0 * T) + 0.4, 3)
@@ -43,7 +42,7 @@ FLOAT = npt.NDArray[np.float64]
 
 
 def columns(text: str | None = None) -> Columns:
-    return Columns(channels=CHANNELS) if text is None else Columns.parse(text, CHANNELS)
+    return Columns(CHANNELS) if text is None else Columns.parse(text, CHANNELS)
 
 
 def assert_same(found: Recording, force: FLOAT = F, place: FLOAT = X) -> None:
@@ -84,13 +83,13 @@ DATA: dict[str, Any] = {
 
 @pytest.mark.parametrize("case", DATA)
 def test_arrays_of_every_kind(case: str) -> None:
-    assert_same(recording_of_arrays(named(DATA[case]), columns=columns()))
+    assert_same(recording_of_arrays(named(DATA[case]), None, columns()))
 
 
 def test_switches_are_0_and_1() -> None:
     on = F > 0
     for data in (on, on.astype(object), pandas.Series(on).astype("boolean")):
-        assert_same(recording_of_arrays({"t": T, "F": data, "x": X}, columns=columns()), on.astype(float))
+        assert_same(recording_of_arrays({"t": T, "F": data, "x": X}, None, columns()), on.astype(float))
 
 
 MISSING: dict[str, Any] = {
@@ -107,7 +106,7 @@ MISSING: dict[str, Any] = {
 
 @pytest.mark.parametrize("case", MISSING)
 def test_what_is_masked_or_no_number_is_missing(case: str) -> None:
-    found = recording_of_arrays({"t": T, "F": F, "x": MISSING[case]}, columns=columns())
+    found = recording_of_arrays({"t": T, "F": F, "x": MISSING[case]}, None, columns())
     np.testing.assert_array_equal(np.delete(found.signals["x"], 50), np.delete(X, 50))
     assert abs(found.signals["x"][50] - X[50]) < 1e-4 and any("missing samples of x: 1" in one for one in found.notes)
 
@@ -124,7 +123,7 @@ def test_what_is_masked_or_no_number_is_missing(case: str) -> None:
 )
 def test_what_holds_no_real_numbers_is_refused(x: Any, part: str) -> None:
     with pytest.raises(PvidError, match=re.escape(part)):
-        recording_of_arrays({"t": T, "F": F, "x": x}, columns=columns())
+        recording_of_arrays({"t": T, "F": F, "x": x}, None, columns())
 
 
 # ---- files
@@ -140,12 +139,12 @@ def test_parquet_and_arrow(tmp_path: Path) -> None:
     with pyarrow.ipc.new_stream(tmp_path / "run.arrow", in_mm.schema) as stream:
         stream.write_table(in_mm)
     for suffix in ("parquet", "feather", "arrow"):
-        found = read_recording(tmp_path / f"run.{suffix}", columns=columns())
+        found = read_recording(tmp_path / f"run.{suffix}", None, columns())
         assert_same(found, F, X * 1000.0 / 1000.0)
         assert found.notes == ("units as the file states them: x in mm",)
     stamped = pyarrow.table({"time": NANOSECONDS, "F": F, "x": X, "note": ["a"] * ROWS})
     pyarrow.parquet.write_table(stamped, tmp_path / "stamped.parquet")
-    assert_same(read_recording(tmp_path / "stamped.parquet", columns=columns("t=time")))
+    assert_same(read_recording(tmp_path / "stamped.parquet", None, columns("t=time")))
 
 
 @pytest.mark.parametrize("title", [None, "Lab 3"])
@@ -162,7 +161,7 @@ def test_workbooks(title: str | None, tmp_path: Path) -> None:
     if title:
         sheet.append(["Mean", 1.0, 2.0])
     book.save(tmp_path / "run.xlsx")
-    found = read_recording(tmp_path / "run.xlsx", columns=columns("t=time,F=force,x=place"))
+    found = read_recording(tmp_path / "run.xlsx", None, columns("t=time,F=force,x=place"))
     np.testing.assert_array_equal(np.delete(found.signals["x"], 50), np.delete(X, 50))
     np.testing.assert_array_equal(found.signals["F"], F)
     notes = "; ".join(found.notes)
@@ -179,7 +178,7 @@ def test_workbook_with_the_table_in_a_later_sheet(tmp_path: Path) -> None:
     for k, (f, x) in enumerate(zip(F.tolist(), X.tolist(), strict=True)):
         data.append([start + datetime.timedelta(milliseconds=2 * k), f, x])
     book.save(tmp_path / "run.xlsx")
-    found = read_recording(tmp_path / "run.xlsx", columns=columns())
+    found = read_recording(tmp_path / "run.xlsx", None, columns())
     assert_same(found)
     assert found.notes[0] == "the table is in sheet 'data' of 'Sheet' and 'data'"
 
@@ -201,7 +200,7 @@ MATLAB: dict[str, tuple[Mapping[str, Any], str | None]] = {
 def test_files_of_matlab(case: str, tmp_path: Path) -> None:
     content, text = MATLAB[case]
     scipy.io.savemat(tmp_path / "run.mat", dict(content))
-    assert_same(read_recording(tmp_path / "run.mat", columns=columns(text)))
+    assert_same(read_recording(tmp_path / "run.mat", None, columns(text)))
 
 
 def written_hdf5(path: Path, content: Mapping[str, Any], units: Mapping[str, str]) -> None:
@@ -241,7 +240,7 @@ def test_files_of_hdf5(case: str, suffix: str, tmp_path: Path) -> None:
         path.write_bytes(bytes(raw))
     else:
         written_hdf5(path, content, units)
-    assert_same(read_recording(path, columns=columns(text)))
+    assert_same(read_recording(path, None, columns(text)))
 
 
 def written_mcap(path: Path, topics: Mapping[str, list[tuple[int, dict[str, Any]]]]) -> None:
@@ -269,7 +268,7 @@ def test_messages_of_json(tmp_path: Path) -> None:
             "/log": [(AT[3], {"t": 1.0})],
         },
     )
-    assert_same(read_recording(path, columns=columns()))
+    assert_same(read_recording(path, None, columns()))
     nested = {
         "/state": [
             (at, {"header": {"stamp": {"sec": at // 10**9, "nanosec": at % 10**9}}, "effort": [f], "pose": {"x": x}})
@@ -277,17 +276,17 @@ def test_messages_of_json(tmp_path: Path) -> None:
         ]
     }
     written_mcap(path, nested)
-    assert_same(read_recording(path, columns=columns("F=effort[0],x=pose.x")))
-    assert_same(read_recording(path, columns=columns("t=header.stamp,F=/state.effort[0],x=/state.pose.x")))
+    assert_same(read_recording(path, None, columns("F=effort[0],x=pose.x")))
+    assert_same(read_recording(path, None, columns("t=header.stamp,F=/state.effort[0],x=/state.pose.x")))
 
 
 def test_signals_of_several_topics_have_the_time_of_the_log(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     rows = list(zip(AT, F.tolist(), X.tolist(), strict=True))
     written_mcap(path, {"/u": [(at, {"data": f}) for at, f, _ in rows], "/y": [(at, {"data": x}) for at, _, x in rows]})
-    assert_same(read_recording(path, columns=columns("F=/u.data,x=/y.data")))
+    assert_same(read_recording(path, None, columns("F=/u.data,x=/y.data")))
     with pytest.raises(PvidError, match="no column 'u' for F"):
-        read_recording(path, columns=columns("F=u,x=/y.data"))
+        read_recording(path, None, columns("F=u,x=/y.data"))
 
 
 def test_messages_of_ros_2(tmp_path: Path) -> None:
@@ -302,8 +301,8 @@ def test_messages_of_ros_2(tmp_path: Path) -> None:
             message = {"stamp": stamp, "effort": [f, 0.0], "x": x, "name": "a"}
             writer.write_message("/state", schema, message, at, at)
         writer.finish()  # type: ignore[no-untyped-call]
-    assert_same(read_recording(path, columns=columns("t=stamp,F=effort[0]")))
-    assert_same(read_recording(path, columns=columns("F=effort[0]")))
+    assert_same(read_recording(path, None, columns("t=stamp,F=effort[0]")))
+    assert_same(read_recording(path, None, columns("F=effort[0]")))
 
 
 def test_messages_of_protobuf_are_rows(tmp_path: Path) -> None:
@@ -324,8 +323,8 @@ def test_messages_of_protobuf_are_rows(tmp_path: Path) -> None:
         for at, f, x in zip(AT, F.tolist(), X.tolist(), strict=True):
             message = kind(stamp={"seconds": at // 10**9, "nanos": at % 10**9}, x=x, effort=[f, 0.0])
             writer.write_message("/state", message, log_time=at, publish_time=at)
-    assert_same(read_recording(path, columns=columns("t=stamp,F=effort[0]")))
-    assert_same(read_recording(path, columns=columns("F=effort[0]")))
+    assert_same(read_recording(path, None, columns("t=stamp,F=effort[0]")))
+    assert_same(read_recording(path, None, columns("F=effort[0]")))
 
 
 @pytest.mark.parametrize("name", ["a.xlsx", "a.mat", "a.h5", "a.mcap", "a.feather", "a.parquet", "a.npz"])
@@ -333,7 +332,7 @@ def test_damaged_files_are_one_sentence(name: str, tmp_path: Path) -> None:
     for content in (b"", b"PK\x03\x04 this is not", bytes(range(256)) * 20):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(PvidError) as caught:
-            read_recording(tmp_path / name, columns=columns())
+            read_recording(tmp_path / name, None, columns())
         assert str(tmp_path / name) in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -353,7 +352,7 @@ def test_damaged_files_are_one_sentence(name: str, tmp_path: Path) -> None:
 def test_other_kinds_of_files_are_refused_with_what_converts_them(name: str, how: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(bytes(range(256)))
     with pytest.raises(PvidError, match="must end in") as caught:
-        read_recording(tmp_path / name, columns=columns())
+        read_recording(tmp_path / name, None, columns())
     assert how in str(caught.value)
 
 
@@ -361,7 +360,7 @@ def test_text_with_another_suffix_is_read(tmp_path: Path) -> None:
     rows = [f"{t:.4f},{f},{x}" for t, f, x in zip(T, F, X, strict=True)]
     for name in ("run.log", "run.lvm", "run", "RUN.ASC"):
         (tmp_path / name).write_text("\n".join(["t,F,x", *rows]) + "\n")
-        assert_same(read_recording(tmp_path / name, columns=columns()))
+        assert_same(read_recording(tmp_path / name, None, columns()))
 
 
 @pytest.mark.parametrize(
@@ -379,4 +378,4 @@ def test_a_package_that_is_not_installed_is_named(
     monkeypatch.setitem(sys.modules, module, None)
     (tmp_path / name).write_bytes(b"x")
     with pytest.raises(PvidError, match=rf"needs the Python package {package}: .*pip install {package}$"):
-        read_recording(tmp_path / name, columns=columns())
+        read_recording(tmp_path / name, None, columns())

@@ -164,15 +164,15 @@ def test_the_state_is_that_of_the_log_and_bounded(sent: list[bytes], tmp_path: P
     assert state["title"] == "a title" and state["up"] and state["lost"] == ""
     assert f"{TICKS} samples" in state["received"] and "weak form of kapitza, core f32" in state["board"]
     assert state["reason"] == "updated" and state["kappa"].endswith("good: parameters identifiable")
-    assert [row["symbol"] for row in state["parameters"]] == ["g*", "l2", "rho2", "w", "d1", "d2", "c"]
+    assert [row["name"] for row in state["parameters"]] == ["g", "l2", "rho2", "w", "d1", "d2", "c"]
     estimates = state["estimates"]
     assert len(estimates["t"]) == TICKS // 100
     g = estimates["curves"][0]
-    assert g["label"] == "g*, gravity in the plane [m/s²]"
+    assert g["label"] == "g [m/s²]"
     assert g["low"][-1] < 9.5 < g["high"][-1] and g["limits"][0] < g["value"][-1] < g["limits"][1]
-    run = field_board.Field(TICKS).run
-    assert max(state["motion"][0]["x"]) == pytest.approx(run.phi[2000:TICKS].max(), rel=1e-6)
-    assert min(state["motion"][1]["x"]) == pytest.approx(1e3 * run.y[2000:TICKS].min(), rel=1e-6)
+    run, motion = field_board.Field(TICKS).run, {one["label"]: one for one in state["motion"]}
+    assert max(motion["phi [rad]"]["x"]) == pytest.approx(run.phi[2000:TICKS].max(), rel=1e-6)
+    assert min(motion["y [mm]"]["x"]) == pytest.approx(1e3 * run.y[2000:TICKS].min(), rel=1e-6)
     assert state["motion"][0]["t"][-1] == pytest.approx(TICKS / 1000, abs=0.03)
     longer = state_of(log + 8 * b"".join(sent))
     assert len(longer["estimates"]["t"]) <= 800 and len(longer["motion"][0]["x"]) <= 800
@@ -189,7 +189,7 @@ def test_every_beginning_of_a_log_has_a_state(sent: list[bytes], tmp_path: Path)
     for at in range(0, len(log), 101):
         state.take(log[at : at + 101])
         told = json.loads(state.as_json())
-        assert [one["label"][:2] for one in told["estimates"]["curves"]] == ["w,", "d1", "d2"]
+        assert [one["label"] for one in told["estimates"]["curves"]] == ["w [1/s²]", "d1", "d2", "c [rad]"]
     noise = np.random.default_rng(1).bytes(50_000) + b"\0"
     assert "damaged pieces" in state_of(log + noise + sent[200])["lost"]
 
@@ -268,7 +268,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
             assert all(one["inked"] > 1000 for one in now), plot
             assert now[-1]["until"] > first[plot][-1]["until"], plot
         assert browser.execute_script("return received.textContent") != before
-        assert drawn(browser, "parameter0")[0]["title"].startswith("w, ")  # the log has no rig file
+        assert drawn(browser, "parameter0")[0]["title"].startswith("w [")  # the log has no rig file
         words = browser.find_element("tag name", "body").text
         assert "board -> out.pvlog" in words and "samples per second" in words and "nothing" in words
         assert browser.execute_script("return alarm.hidden") is True
@@ -312,7 +312,7 @@ def test_a_finished_log_fits_every_screen_and_scheme(
         until(lambda: _answers(address))
         browser.get(address)
         until(lambda: all(drawn(browser, plot) for plot in PLOTS))
-        until(lambda: len(drawn(browser, "signal0")) == 2)  # what the estimate predicts, beside what was measured
+        until(lambda: len(drawn(browser, "signal1")) == 2)  # what the estimate predicts, beside what was measured
         assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
         # One script: the page replaces its tiles at any time.
         shown = (
@@ -365,13 +365,13 @@ def test_state_of_a_log_names_withheld_windows_and_what_the_estimate_predicts(fi
     state = LiveState(finished, "")
     state.take(log)
     first = json.loads(state.as_json())
-    assert "modelled" not in first["motion"][0] and first["modelled"] == ""
+    assert "modelled" not in first["motion"][1] and first["modelled"] == ""
     assert first["marks"]["t"] and not any(first["marks"]["rejected"])
     assert all(t < 12 for t in first["marks"]["t"])
-    assert [row["symbol"] for row in first["parameters"] if row["large"]] == ["g*", "l2", "rho2"]
+    assert [row["name"] for row in first["parameters"] if row["large"]] == ["g", "l2", "rho2"]
     then = until(lambda: (now := json.loads(state.as_json())) and now["modelled"] and now)
     assert then["modelled"].startswith("phi to ") and "R^2 0.99" in then["modelled"]
-    measured, modelled = (np.array(then["motion"][0][name], float) for name in ("x", "modelled"))
+    measured, modelled = (np.array(then["motion"][1][name], float) for name in ("x", "modelled"))
     there = np.isfinite(modelled)
     assert there.sum() > 0.5 * there.size and np.std((measured - modelled)[there]) < 0.1 * np.std(measured)
 

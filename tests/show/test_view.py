@@ -27,10 +27,10 @@ from pvid.base.rounding import with_error, with_prefix
 from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.history import History, Thinned, envelope
+from pvid.log.mechanism import UNNAMED, LogMechanism
 from pvid.log.reader import Account, LogReader, LogStream, Record
-from pvid.log.values import UNKNOWN_RIG, Rows, Values
+from pvid.log.values import Rows, Values
 from pvid.log.words import kappa_share, kappa_words, reason_words
-from pvid.models.model import Mechanism
 from pvid.settings.enums import Reason
 from pvid.show.view import LiveView, sparkline
 
@@ -44,7 +44,7 @@ def sent() -> list[bytes]:
     return list(field_board.frames(field_board.messages(field_board.Field(TICKS, estimate_every=100))))
 
 
-def view_of(frames: list[bytes], mechanism: Mechanism = MECHANISM, width: int = 100) -> str:
+def view_of(frames: list[bytes], mechanism: LogMechanism = MECHANISM, width: int = 100) -> str:
     """What is seen after these frames."""
     console = Console(width=width, force_terminal=True, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
     view = LiveView(console, "a port -> a [bold]log", mechanism)
@@ -74,7 +74,7 @@ def test_view_shows_every_item(sent: list[bytes]) -> None:
     assert f"{newest['kappa']:.2g}  good" in seen and "times the noise of the sensors" in seen
     assert "updated" in seen and "the estimate was updated" in seen
     assert "a port -> a [bold]log" in seen
-    assert "rad, pivot" in seen
+    assert " rad, y " in seen or " mm, phi " in seen
 
 
 def test_losses_and_a_broken_link_are_reported(sent: list[bytes]) -> None:
@@ -89,9 +89,9 @@ def test_view_before_the_first_frame_is_labelled(sent: list[bytes]) -> None:
     assert "none yet" in beginning and "no estimate yet" in beginning
 
 
-def test_without_the_rods_length_there_are_no_physical_parameters(sent: list[bytes]) -> None:
-    seen = view_of(sent, mechanism=UNKNOWN_RIG)
-    assert "radius of gyration" not in seen and "L1 L2" in seen
+def test_without_the_rods_length_there_are_no_outputs(sent: list[bytes]) -> None:
+    seen = view_of(sent, mechanism=UNNAMED)
+    assert "rho2" not in seen and "d2" in seen
 
 
 def test_estimate_outside_the_physical_region_is_reported(sent: list[bytes]) -> None:
@@ -103,8 +103,8 @@ def test_estimate_outside_the_physical_region_is_reported(sent: list[bytes]) -> 
             wild = replace(wild, p=(11.56, 0.25, 0.2, *[0.0] * 5))
         frames.append(link.encode(wild, item.sequence, item.tick))
     seen = view_of(frames)
-    assert "g*, l2, rho2" in seen and "outside the physical region" in seen and "radius of gyration" not in seen
-    assert "outside" not in view_of(frames, mechanism=UNKNOWN_RIG)
+    assert "g, l2, rho2" in seen and "outside the physical region" in seen
+    assert "outside" not in view_of(frames, mechanism=UNNAMED)
 
 
 def test_board_name_is_escaped(native: Native) -> None:
@@ -209,11 +209,11 @@ def test_the_history_is_that_of_the_log_in_bounded_memory(sent: list[bytes], tmp
     for record in stream.feed(b"".join(sent)):
         history.take(record)
         whole.take(record)
-    t, phi, y = whole.samples()
+    t, y, phi = whole.samples()
     run = field_board.Field(TICKS).run
     assert np.array_equal(phi, run.phi[:TICKS].astype(np.float32)) and np.array_equal(y, run.y[:TICKS].astype("f4"))
     assert t == pytest.approx(np.arange(TICKS) / 1000, abs=2e-9)
-    assert history.samples() == pytest.approx(np.stack([t, phi, y])[:, -3000:])
+    assert history.samples() == pytest.approx(np.stack([t, y, phi])[:, -3000:])
     assert len(whole.estimates("t")) == TICKS // 100 and len(history.estimates("t")) <= 40
     late = whole.estimates("t") - np.arange(100, TICKS + 1, 100) / 1000
     assert (late > -2e-9).all() and (late < field_board.SAMPLES_A_FRAME / 1000).all()  # log_time never goes back
@@ -241,7 +241,7 @@ def test_the_view_costs_the_same_however_many_frames_come(monkeypatch: pytest.Mo
         for i in range(frames):
             history.take(Record(0, 1, n * i, link.Raw.of_values(np.full(n, i), np.zeros(n))))
             history.take(Record(0, 1, n * (i + 1), replace(estimate, updates=i)))
-        assert history.newest["w"] == 31.0 and history.samples()[1, -1] == frames - 1
+        assert history.newest["w"] == 31.0 and history.samples()[2, -1] == frames - 1
         assert len(history.estimates("w")) >= points
         spent.append(calls)
         history.reason  # noqa: B018 - looking once more costs nothing
@@ -327,7 +327,7 @@ def test_log_draws_on_a_terminal_and_leaves_the_last_picture(tmp_path: Path, boa
     assert terminal.process.returncode == 0, seen
     assert "has not described itself yet" in seen or "weak form" in seen
     last = seen[seen.rindex("╭") :]
-    assert "L1 L2" in last and f"{samples_in(tmp_path / 'out.pvlog')} samples in 1 segment" in last
+    assert "d2 " in last and f"{samples_in(tmp_path / 'out.pvlog')} samples in 1 segment" in last
     assert last.count("ended") >= 1 and "Ctrl-C ends" not in last
 
 

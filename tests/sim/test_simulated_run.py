@@ -15,9 +15,8 @@ from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Jet, jets, sgn
 from pvid.models.drive import Chirp, RandomSteps, Sines, Steps, Sum
 from pvid.models.mechanisms import compiled_of
-from pvid.models.model import Channel
 from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import read_recording
 from pvid.sim.bound import bound
@@ -185,8 +184,8 @@ def test_run_is_written_with_its_rig_file(simulation: RigSimulation, tmp_path: P
     assert settings == tmp_path / "shaft.toml"
     rig = MechanismRig.parse(settings.read_text(encoding="utf-8"))
     assert (rig.model, rig.sample_rate) == ("shaft", 1000.0)
-    channels = tuple(Channel(one.name, one.unit, one.name) for one in simulation.model.signals)
-    again = read_recording(tmp_path / "shaft.csv", rig.sample_rate, Columns(channels=channels))
+    channels = tuple(Channel(one.name, one.unit) for one in simulation.model.signals)
+    again = read_recording(tmp_path / "shaft.csv", rig.sample_rate, Columns(channels))
     assert list(again.signals) == ["M", "phi", "psi"] and again.notes == ()
     for name, values in again.signals.items():
         np.testing.assert_array_equal(values, run[name])

@@ -12,7 +12,6 @@ from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.refined_image import build_refined_image
 from pvid.board.sizes import Footprint, built_engine, measured, refined_replay
 from pvid.codegen.fitted_sizes import fitted_sizes
-from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core
 
 HEADER = ("choice", "text", "state", "mean", "longest")
@@ -69,10 +68,10 @@ def footprint_of(choice: Choice, place: int) -> Footprint:
         image, tree = build_refined_image(board, both, f"choice-{place}", choices)
         return measured(board, built_engine(image, tree, both.weak.name))[0]
     if choice.core == "f32":
-        run = mechanism_run(DEFAULT, long=True)
+        run = mechanism_run("kapitza", long=True)
         name, files, fitted = run.name, mechanism_image.files_of(run), fitted_sizes(run.config)
     else:
-        fixed = fixed_run(DEFAULT, long=True)
+        fixed = fixed_run("kapitza", long=True)
         name, files, fitted = fixed.name, mechanism_image_q31.files_of(fixed), fixed.sizes
     sizes = fitted | dict(choice.sizes)
     image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=choices)

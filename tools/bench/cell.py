@@ -19,13 +19,12 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.replacing import replacing
 from pvid.models.mechanisms import compiled_of
-from pvid.models.model import Channel
 from pvid.models.registry import asked_for
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.rows import Compiled, WeakRows
 from pvid.oracle.weak.solve import batch
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.run import Recording, read_recording, write_recording
 
 Float = npt.NDArray[np.float64]
@@ -36,7 +35,7 @@ DURATION = 7200  # samples
 PARAMETERS = "Chen2020"  # PyBaMM's set for the LG M50, a 21700 cell of 5 A h
 CURRENT_STEP = 1e-3  # A, of the recorded current
 VOLTAGE_STEP = 1e-4  # V, of the recorded voltage
-CHANNELS = (Channel("i", "A", "current, positive in discharge"), Channel("v", "V", "voltage at the terminals"))
+CHANNELS = (Channel("i", "A"), Channel("v", "V"))  # the current is positive in discharge
 
 
 @dataclass(frozen=True)
@@ -202,7 +201,7 @@ class Outcome:
 
 def recorded(name: str) -> Recording:
     """A record of tests/data/cell."""
-    return read_recording(DATA / f"{name}.csv.gz", columns=Columns(channels=CHANNELS))
+    return read_recording(DATA / f"{name}.csv.gz", None, Columns(CHANNELS))
 
 
 def outcome(title: str, model_name: str, own: str, other: str) -> Outcome:

@@ -18,7 +18,6 @@ from pvid.board.profile import profile
 from pvid.board.sizes import Configuration, measure
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.core.sources import INCLUDES
-from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core
 
 Parts = Sequence[tuple[str, str]]
@@ -221,7 +220,7 @@ Tables = Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]  # marker,
 
 
 def _one_of(names: Sequence[str]) -> str:
-    return DEFAULT if DEFAULT in names else names[0]
+    return "kapitza" if "kapitza" in names else names[0]
 
 
 def float_tables(names: Sequence[str], progress: Callable[[], object]) -> Tables:

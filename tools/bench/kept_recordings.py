@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from bench.recordings import Package, Piece, Source
-from pvid.models.model import Channel
+from bench.recordings import Measured, Package, Piece, Source
 
 Float = npt.NDArray[np.float64]
 
@@ -63,7 +62,10 @@ KEPT: tuple[Source, ...] = (
         read=_switched_motor,
         identify=Piece(_MOTOR, 40.0, 200.0),
         predict=Piece(_MOTOR, 210.0, 352.0),
-        channels=(Channel("u", "", "1: on, 0: off"), Channel("y", "", "speed, numbers of the file / 1000")),
+        channels=(
+            Measured("u", "", meaning="1: on, 0: off"),
+            Measured("y", "", meaning="speed, numbers of the file / 1000"),
+        ),
         rate=50.0,
         decimals={"u": 0, "y": 4},
         note=(
@@ -84,7 +86,7 @@ KEPT: tuple[Source, ...] = (
         # from where the rate is largest: there the angle, which is not measured, passes 0, where a simulation starts
         identify=Piece(_FORK, end=15.094),
         predict=Piece(_FORK, 15.094),
-        channels=(Channel("v", "V", "voltage of the rate gyroscope less 1.356 V"),),
+        channels=(Measured("v", "V", meaning="voltage of the rate gyroscope less 1.356 V"),),
         rate=200.0,
         decimals={"v": 4},
         note=(
@@ -101,7 +103,10 @@ KEPT: tuple[Source, ...] = (
         read=_lift,
         identify=Piece(_LIFT, 14.0, 41.0),
         predict=Piece(_LIFT, 41.0, 67.5),
-        channels=(Channel("q", "m", "height of the torso"), Channel("i", "A", "current of its motor")),
+        channels=(
+            Measured("q", "m", meaning="height of the torso"),
+            Measured("i", "A", meaning="current of its motor"),
+        ),
         rate=20.0,
         decimals={"i": 4, "q": 7},
         note=(

@@ -31,8 +31,8 @@ from pvid.link.frames import (
     Schema,
     Status,
 )
+from pvid.log.mechanism import LogMechanism
 from pvid.log.rig import mechanism_in
-from pvid.models.model import Mechanism
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.twin import fnv
 
@@ -86,7 +86,7 @@ def rig() -> MechanismRig:
 
 
 @cache
-def mechanism() -> Mechanism:
+def mechanism() -> LogMechanism:
     """Of the rig."""
     found = mechanism_in(toml_document(rig().text()))
     assert found is not None

@@ -28,11 +28,13 @@ _PIECE = 100_000
 
 _READ = """
 import re, sys, time
-from pvid.rig.run import read_run
+from pvid.rig.columns import Channel, Columns
+from pvid.rig.run import read_recording
+columns = Columns((Channel("phi", "rad"), Channel("y", "m")))
 def peak():  # not getrusage, whose peak a child has from its parent
     return int(re.search(r"VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1])
 before, begin = peak(), time.process_time()
-read_run(sys.argv[1])
+read_recording(sys.argv[1], None, columns)
 print(time.process_time() - begin, peak(), before)
 """
 

@@ -19,8 +19,7 @@ from pvid.base.errors import PvidError
 from pvid.base.replacing import replacing
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
-from pvid.models.model import Channel
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.run import Recording, read_recording, write_recording
 
 Float = npt.NDArray[np.float64]
@@ -46,6 +45,13 @@ class Piece:
     start: float = 0.0
     end: float = float("inf")
     part: int = 0
+
+
+@dataclass(frozen=True)
+class Measured(Channel):
+    """A channel, and what it is in words."""
+
+    meaning: str = ""
 
 
 @dataclass(frozen=True)
@@ -133,7 +139,7 @@ class Source:
     read: Callable[[Path, int], Mapping[str, Float]]
     identify: Piece
     predict: Piece
-    channels: tuple[Channel, ...]
+    channels: tuple[Measured, ...]
     rate: float | None = None
     decimals: Mapping[str, int] = field(default_factory=dict)
     published: Mapping[str, float] = field(default_factory=dict)
@@ -178,7 +184,7 @@ class Source:
 
     def load(self, folder: Path, piece: str) -> Recording:
         """A piece that was cut before, in FOLDER/NAME: "identify", "predict" or the name of a trap."""
-        return read_recording(folder / self.name / f"{piece}.csv.gz", columns=Columns(channels=self.channels))
+        return read_recording(folder / self.name / f"{piece}.csv.gz", None, Columns(self.channels))
 
 
 def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
@@ -300,16 +306,16 @@ _CELL = Repository(
     "Silencefrog9305/Digital-Twins-for-Battery-Using-CTA-MTL", "ec0fe7c0e6ceb8576086d3adc8232b7d14616deb"
 )
 _TWO_LINK_CHANNELS = (
-    Channel("q1", "rad", "angle of the upper link"),
-    Channel("q2", "rad", "angle of the lower link to the upper"),
-    Channel("t1", "N*m", "torque of the upper motor"),
-    Channel("t2", "N*m", "torque of the lower motor"),
+    Measured("q1", "rad", meaning="angle of the upper link"),
+    Measured("q2", "rad", meaning="angle of the lower link to the upper"),
+    Measured("t1", "N*m", meaning="torque of the upper motor"),
+    Measured("t2", "N*m", meaning="torque of the lower motor"),
 )
-_ONE_LINK_CHANNELS = (Channel("q", "rad", "angle"), Channel("tau", "N*m", "torque"))
+_ONE_LINK_CHANNELS = (Measured("q", "rad", meaning="angle"), Measured("tau", "N*m", meaning="torque"))
 _CELL_CHANNELS = (
-    Channel("i", "A", "current"),
-    Channel("q", "A*s", "charge drawn"),
-    Channel("v", "V", "voltage"),
+    Measured("i", "A", meaning="current"),
+    Measured("q", "A*s", meaning="charge drawn"),
+    Measured("v", "V", meaning="voltage"),
 )
 
 
@@ -395,7 +401,7 @@ SOURCES = (
         read=_free_swing(("q",)),
         identify=Piece("ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat", part=0),
         predict=Piece("ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat", part=1),
-        channels=(Channel("q", "rad", "angle from upright"),),
+        channels=(Measured("q", "rad", meaning="angle from upright"),),
         # m a g/(m a^2 + I) and k/(m a^2 + I) of the five numbers of the file
         published={"w2": 64.221, "k": 0.06723, "c": 0.0, "o": 0.0},
         published_at="ParameterEstimation/SinglePendulum/EstimatedParameters_SinglePendulum.mat",
@@ -412,7 +418,7 @@ SOURCES = (
         predict=Piece(
             "ParameterEstimation/DoublePendulum/DoublePendulumDataForParameterEstimation.mat", 16.0, 26.0, part=0
         ),
-        channels=tuple(Channel(name, "rad", "angle from upright") for name in _ANGLES),
+        channels=tuple(Measured(name, "rad", meaning="angle from upright") for name in _ANGLES),
         # of the ten numbers of the file, over m2 a2 L1
         published={"A": 2.035, "B": 1.134, "G1": 120.0, "G2": 56.8, "k1": 0.0854, "k2": 0.0036},
         published_at="ParameterEstimation/DoublePendulum/EstimatedParameters_DoublePendulum.mat",

@@ -23,12 +23,12 @@ from pvid.board.target import HOST_TARGET, open_target
 from pvid.link.frames import Configuration, Raw, RawCount, Source
 from pvid.log.export import FORMATS, export_log
 from pvid.log.file import Segment
+from pvid.log.mechanism import LogMechanism
 from pvid.log.reader import Account, LogReader
 from pvid.log.recorder import EmulatorSource, Logger
 from pvid.log.rig import mechanism_in
 from pvid.log.values import Rows, Values
 from pvid.log.verify import Verdict, Verifier
-from pvid.models.model import Mechanism
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.enums import Core
 from pvid.show.log_figure import write_log_figure
@@ -136,7 +136,7 @@ def _crossed(log: Path) -> Iterator[int]:
                 yield (before[1] - 1) // TURN
 
 
-def _samples(log: Path, mechanism: Mechanism) -> Iterator[Rows]:
+def _samples(log: Path, mechanism: LogMechanism) -> Iterator[Rows]:
     values = Values(mechanism)
     for record in LogReader(log):
         for rows in values.rows(record):
@@ -158,7 +158,7 @@ def _began(log: Path, number: int) -> int:
     return next(record.unix_ns for record in found if record.segment == number)
 
 
-def _faults_of_times(log: Path, mechanism: Mechanism, rate: float) -> Iterator[str]:
+def _faults_of_times(log: Path, mechanism: LogMechanism, rate: float) -> Iterator[str]:
     """Of the columns that exports, views and tee share: a step of a tick in t and in log_time, within a segment."""
     latest: dict[str, int | float] = {}
     for rows in _samples(log, mechanism):
@@ -176,7 +176,7 @@ def _faults_of_times(log: Path, mechanism: Mechanism, rate: float) -> Iterator[s
         latest["segment"] = columns["segment"][-1]
 
 
-def _faults_of_exports(log: Path, mechanism: Mechanism) -> Iterator[str]:
+def _faults_of_exports(log: Path, mechanism: LogMechanism) -> Iterator[str]:
     """Of every format: the ticks of the samples that stand in it."""
     expected = np.concatenate([rows.columns["tick"] for rows in _samples(log, mechanism)])
     for form, read in {"csv": _ticks_of_csv, "npz": _ticks_of_npz, "parquet": _ticks_of_parquet, "mcap": _mcap}.items():

@@ -34,18 +34,23 @@ _PLAIN = (1.0, 1e4)  # values that need none
 _FIXED = (1e-3, 1e4, 9)  # values without an exponent, and the decimals that they have at most
 
 
+def prefix_of(size: float, unit: str) -> tuple[str, float]:
+    """The unit with the SI prefix for numbers up to `size`, where it takes one, and what a number in it is multiplied
+    with: 0.0146, "m" is ("mm", 1e-3)."""
+    power = 0
+    if unit in _PREFIXED and size > 0 and not _PLAIN[0] <= size < _PLAIN[1]:
+        power = min(max(math.floor(math.log10(size) / 3), min(_PREFIXES)), max(_PREFIXES))
+    return f"{_PREFIXES[power]}{unit}", 1000.0**power
+
+
 def with_prefix(value: float, error: float, unit: str) -> tuple[str, str, str, float]:
     """Value and error to the error's second digit, their unit with an SI prefix where the unit takes one, and what a
     number in that unit is multiplied with: 0.0030002, 8e-7, "H" is ("3.00020", "0.00080", "mH", 1e-3).
 
     Without a prefix 0.05 has up to nine decimals, 0.0005 an exponent.
     """
-    power = 0
-    size = abs(value)
-    if unit in _PREFIXED and size > 0 and not _PLAIN[0] <= size < _PLAIN[1]:
-        power = min(max(math.floor(math.log10(size) / 3), min(_PREFIXES)), max(_PREFIXES))
-    scale = 1000.0**power
-    value, error, unit = value / scale, error / scale, f"{_PREFIXES[power]}{unit}"
+    unit, scale = prefix_of(abs(value), unit)
+    value, error = value / scale, error / scale
     if _FIXED[0] <= abs(value) < _FIXED[1] and 10.0 ** -(_FIXED[2] - 1) <= error < 1.0:
         decimals = 1 - math.floor(math.log10(error))
         return f"{value:.{decimals}f}", f"{error:.{decimals}f}", unit, scale

@@ -36,7 +36,7 @@ from pvid.configuration.weak import (
 from pvid.core.native import Native
 from pvid.core.weak_native import RefinedIdentifier, WeakIdentifier
 from pvid.link.frames import Configuration, Form
-from pvid.link.names import BoardNames, shown_of_refined
+from pvid.link.names import BoardNames, Quantity, shown_of_refined
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import constants_of
 from pvid.models.registry import asked_for, is_named, shipped
@@ -170,9 +170,9 @@ class MechanismBoard(FloatBoard):
         refined = [self.equations.parameters[place] for place in self.shown]
         return BoardNames(
             self.config.design.model.name,
-            tuple((name, units[name]) for name in self.config.design.model.sample_names),
-            tuple((one.name, one.unit) for one in self.compiled.unknowns),
-            refined=tuple((one.name, "" if one.unit == "1" else one.unit) for one in refined),
+            tuple(Quantity(name, units[name]) for name in self.config.design.model.sample_names),
+            tuple(Quantity(one.name, one.unit) for one in self.compiled.unknowns),
+            refined=tuple(Quantity(one.name, "" if one.unit == "1" else one.unit) for one in refined),
         )
 
     @property

@@ -31,7 +31,7 @@ from pvid.core.weak_native_q31 import WeakIdentifierQ31
 from pvid.design.c_tables import float_literal
 from pvid.design.weak_q31 import circle_of
 from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Count, Form, Message, Source
-from pvid.link.names import BoardNames
+from pvid.link.names import BoardNames, Quantity
 from pvid.models.mechanisms import constants_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
@@ -111,8 +111,8 @@ class MechanismBoardQ31:
         units = {one.name: one.unit for one in compiled.signals}
         return BoardNames(
             self.engine.name,
-            tuple((name, units[name]) for name in self.engine.sample_names),
-            tuple((one.name, one.unit) for one in compiled.unknowns),
+            tuple(Quantity(name, units[name]) for name in self.engine.sample_names),
+            tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
             self.engine.lsb,
         )
 

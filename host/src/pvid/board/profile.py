@@ -14,10 +14,9 @@ from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
 from pvid.board.engine_image import engine_image
 from pvid.board.refined_image import build_refined_image
 from pvid.board.replay_image import parse_report
-from pvid.board.sizes import refined_replay
+from pvid.board.sizes import STANDARD, refined_replay
 from pvid.board.strong_image import build_image, measured_from, standard_run
 from pvid.core.sources import ROOT
-from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Form
 from pvid.settings.forms import FORMS
 
@@ -84,7 +83,7 @@ def _named(symbols: list[_Symbol], name: str) -> _Symbol:
     raise PvidError(f"the image has no function {name}")
 
 
-def profile(board: Board, form: Form, core: Core = "f32", model: str = DEFAULT) -> Profile:
+def profile(board: Board, form: Form, core: Core = "f32", model: str = STANDARD) -> Profile:
     """Plays the replay image of the standard run, or in the weak form that of a shipped mechanism, and counts.
 
     Raises

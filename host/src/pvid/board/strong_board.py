@@ -20,7 +20,7 @@ from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.strong import strong_design
 from pvid.core.native import Native
 from pvid.link.frames import Configuration, Form
-from pvid.link.names import BoardNames
+from pvid.link.names import BoardNames, Quantity
 from pvid.model.strong import strong_form
 from pvid.models.mechanisms import constants_of
 from pvid.models.simulated_rig import simulated_rig
@@ -88,8 +88,8 @@ class StrongBoard(FloatBoard):
     @property
     def names(self) -> BoardNames:
         """What the board says about itself."""
-        samples = tuple((one.name, one.unit) for one in self.strong.signals)
-        parameters = tuple((one.name, one.unit) for one in self.compiled.unknowns)
+        samples = tuple(Quantity(one.name, one.unit) for one in self.strong.signals)
+        parameters = tuple(Quantity(one.name, one.unit) for one in self.compiled.unknowns)
         return BoardNames(self.compiled.name, samples, parameters)
 
     @property

@@ -11,7 +11,6 @@ from pvid.base.console import write_stderr
 from pvid.board.boards import BOARDS
 from pvid.board.target import HOST_TARGET
 from pvid.cli.input import FigurePath, force_option
-from pvid.models.registry import DEFAULT
 
 BOARD = BOARDS["mps2-an386"]
 
@@ -34,7 +33,7 @@ def target() -> Target:
 
 
 @click.command(name="demo")
-@click.argument("model", default=DEFAULT)
+@click.argument("model", default="kapitza")
 @click.option(
     "--figure",
     type=FigurePath(),

@@ -13,20 +13,18 @@ from rich.console import Console
 
 from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
-from pvid.base.toml_text import toml_document
 from pvid.board.stream_image import settings_number
 from pvid.board.target import EMULATORS, HOST_TARGET, open_target
 from pvid.cli.log_text import record_text
 from pvid.link.frames import Configuration, Source
 from pvid.link.port import BAUD
 from pvid.log.live_stream import live_stream
+from pvid.log.mechanism import UNNAMED, LogMechanism, mechanism_described
 from pvid.log.reader import Account, Observer
 from pvid.log.recorder import EmulatorSource, Logger, PortSource, TextError
-from pvid.log.rig import LOG_SUFFIX, mechanism_in, refuse_to_append
+from pvid.log.rig import LOG_SUFFIX, refuse_to_append
 from pvid.log.rig_choice import rig_of
 from pvid.log.status import StatusLine
-from pvid.log.values import UNKNOWN_RIG
-from pvid.models.model import Mechanism
 from pvid.models.registry import names
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
@@ -41,6 +39,7 @@ if TYPE_CHECKING:
     from pvid.board.mechanism_board import MechanismBoard
     from pvid.board.mechanism_board_q31 import MechanismBoardQ31
     from pvid.board.strong_board import StrongBoard
+    from pvid.model.compiled import CompiledModel
 
     Board = MechanismBoard | MechanismBoardQ31 | StrongBoard
 
@@ -167,7 +166,7 @@ def command(
         refuse_to_append(out, text)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)
-    mechanism = UNKNOWN_RIG if text is None else mechanism_in(toml_document(text)) or UNKNOWN_RIG
+    mechanism = UNNAMED if board is None else _mechanism(board.rig.compiled())
     title = f"{port} -> {out}"
     with page(web, out, title) if web is not None else nullcontext("") as address:
         observers: list[Observer] = [live_stream(one, mechanism) for one in live]
@@ -195,7 +194,11 @@ def command(
     return print_account(account, allow_loss, logger.failures)
 
 
-def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
+def _mechanism(model: CompiledModel) -> LogMechanism:
+    return mechanism_described(model.name, model, {one.name: one.value for one in model.knowns})
+
+
+def _view(title: str, mechanism: LogMechanism, address: str) -> Observer:
     """The live view on a terminal that can draw it, else a line every ten seconds."""
     if address and not is_local(address):
         write_stderr(f"every computer with access to this machine can open {address}")
@@ -205,7 +208,7 @@ def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     write_stderr(f"{title}; Ctrl-C ends the recording")
     if address:
         write_stderr(f"live page: {address}")
-    return StatusLine(sys.stderr, mechanism.model)
+    return StatusLine(sys.stderr, mechanism)
 
 
 def _board(

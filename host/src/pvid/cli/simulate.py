@@ -13,7 +13,7 @@ import click
 from pvid.base.console import DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import NewFile, force_option
-from pvid.models.registry import DEFAULT, asked_for
+from pvid.models.registry import asked_for
 from pvid.models.registry import names as names_of_shipped
 from pvid.rig.mechanism_file import MechanismRig, with_settings
 
@@ -79,7 +79,7 @@ def _with_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command(name="simulate")
 @_OUT
-@click.option("--model", default=DEFAULT, show_default=True, help="A mechanism of `pvid models`, or a model file.")
+@click.option("--model", default="kapitza", show_default=True, help="A mechanism of `pvid models`, or a model file.")
 @_with_options
 def command(model: str, out: Path, **options: Any) -> int:
     """Simulates a rig with its sensors; writes the run OUT (.csv, .csv.gz, .npz, .parquet) and its rig file."""

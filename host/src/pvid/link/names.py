@@ -21,11 +21,11 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import shown
 from pvid.link.frames import MAX_P, MAX_SAMPLES
-from pvid.models.model import Model
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]{0,31}"
 _COUNT = re.compile(rf"count ({_NAME}) ([0-9.e+-]{{1,24}})")
@@ -40,19 +40,36 @@ def shown_of_refined(parameters: int, widths: int, in_p: Sequence[int]) -> tuple
     return found if len(found) <= MAX_P else tuple(one for one in found if one not in in_p)
 
 
+class Quantity(NamedTuple):
+    """A number with a name, and its unit in SI, in ASCII as in "m/s^2"; "" for a pure number."""
+
+    name: str
+    unit: str
+
+    @property
+    def shown_unit(self) -> str:
+        """For pages and terminals, as in "m/s²"."""
+        return self.unit.replace("^2", "²")
+
+    @property
+    def label(self) -> str:
+        """As in "w [1/s²]"."""
+        return f"{self.name} [{self.shown_unit}]" if self.unit else self.name
+
+
 @dataclass(frozen=True)
 class BoardNames:
-    """A mechanism by the names and units of its samples and of its parameters; a unit of "" is that of a number.
+    """A mechanism by its samples and parameters.
 
     counts : value of a count of each sample, if the board sends counts
     refined : entries of the refinement's r that it sends; () without a second stage
     """
 
     mechanism: str
-    samples: tuple[tuple[str, str], ...]
-    parameters: tuple[tuple[str, str], ...]
+    samples: tuple[Quantity, ...]
+    parameters: tuple[Quantity, ...]
     counts: tuple[float, ...] = ()
-    refined: tuple[tuple[str, str], ...] = ()
+    refined: tuple[Quantity, ...] = ()
 
     @property
     def text(self) -> str:
@@ -76,7 +93,7 @@ class BoardNames:
         mechanism, *lines = text.decode("ascii", "replace").split("\n")
         if not re.fullmatch(_NAME, mechanism):
             raise PvidError(f"{shown(mechanism, 40)} is no name of a mechanism")
-        found: dict[str, list[tuple[str, str]]] = {"sample": [], "p": [], "r": []}
+        found: dict[str, list[Quantity]] = {"sample": [], "p": [], "r": []}
         counts: dict[str, float] = {}
         for line in lines:
             if (of_count := _COUNT.fullmatch(line)) is not None:
@@ -85,7 +102,7 @@ class BoardNames:
             match = _LINE.fullmatch(line)
             if match is None:
                 raise PvidError(f"{shown(line, 60)} names no sample and no parameter")
-            found[match[1]].append((match[2], match[3] or ""))
+            found[match[1]].append(Quantity(match[2], match[3] or ""))
         for what, least, most in (("sample", 1, MAX_SAMPLES), ("p", 1, MAX_P), ("r", 0, MAX_P)):
             named = [name for name, _ in found[what]]
             if not least <= len(named) <= most or len(set(named)) < len(named):
@@ -106,12 +123,3 @@ def _number(text: str) -> float:
     if not 0 < value < math.inf:
         raise PvidError(f"{shown(text, 30)} is no value of a count")
     return value
-
-
-def names_of(model: Model) -> BoardNames:
-    """What the image of a mechanism of the library says about it."""
-    return BoardNames(
-        model.name,
-        tuple((one.name, one.unit) for one in model.channels),
-        tuple((one.name, one.unit) for one in model.parameters),
-    )

@@ -19,10 +19,10 @@ from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
 from pvid.base.version import __version__
 from pvid.log.json_messages import encoded, messages, schema, topic, units
+from pvid.log.mechanism import LogMechanism
 from pvid.log.reader import LogReader
 from pvid.log.rig import hello_of_log, names_of_log
-from pvid.log.values import Column, Rows, Tables, Values, refined_of
-from pvid.models.model import Mechanism
+from pvid.log.values import Column, Rows, Tables, Values
 
 _BATCH = 1 << 15  # rows
 
@@ -225,10 +225,10 @@ class McapWriter:
 FORMATS: dict[str, type[Writer]] = {"csv": CsvWriter, "parquet": ParquetWriter, "mcap": McapWriter, "npz": NpzWriter}
 
 
-def export_log(log: Path, form: str, base: Path, mechanism: Mechanism) -> list[Path]:
+def export_log(log: Path, form: str, base: Path, mechanism: LogMechanism) -> list[Path]:
     """Writes a log as one of FORMATS under the name `base` with the format's endings; returns what was written.
 
-    `mechanism` of the rig: without its constants there are no physical parameters.
+    `mechanism` of the rig: without its constants there are no outputs.
 
     Raises
     ------
@@ -237,7 +237,7 @@ def export_log(log: Path, form: str, base: Path, mechanism: Mechanism) -> list[P
     """
     kind = FORMATS[form]
     names = names_of_log(log)
-    values = Values(mechanism, hello_of_log(log), refined=() if names is None else refined_of(names))
+    values = Values(mechanism, hello_of_log(log), refined=() if names is None else names.refined)
     suffixes = kind.suffixes(values.tables)
     try:
         with ExitStack() as stack:

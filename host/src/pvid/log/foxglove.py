@@ -14,9 +14,9 @@ from pvid.base.errors import PvidError
 from pvid.base.packages import installing
 from pvid.link.frames import Loss
 from pvid.log.json_messages import encoded, messages, schema, topic, units
+from pvid.log.mechanism import UNNAMED, LogMechanism
 from pvid.log.reader import Account, Record
-from pvid.log.values import UNKNOWN_RIG, Rows, Tables, Values
-from pvid.models.model import Mechanism
+from pvid.log.values import Rows, Tables, Values
 
 if TYPE_CHECKING:
     from foxglove import Channel, Parameter
@@ -33,7 +33,7 @@ class FoxgloveServer:
     address
         As given, for messages.
     mechanism
-        Of the rig; without its constants no physical parameters are served.
+        Of the rig; without its constants no outputs are served.
 
     Raises
     ------
@@ -41,7 +41,7 @@ class FoxgloveServer:
         When foxglove-sdk is not installed or the address cannot be used.
     """
 
-    def __init__(self, address: str, host: str, port: int, mechanism: Mechanism = UNKNOWN_RIG) -> None:
+    def __init__(self, address: str, host: str, port: int, mechanism: LogMechanism = UNNAMED) -> None:
         try:
             import foxglove
             from foxglove.websocket import Capability, ServerListener
@@ -50,7 +50,7 @@ class FoxgloveServer:
         self._foxglove = foxglove
         foxglove.set_log_level("ERROR")  # it reports every client that comes and goes
         self._context = foxglove.Context()
-        self._values = Values(mechanism, follows=mechanism is UNKNOWN_RIG)
+        self._values = Values(mechanism, follows=mechanism is UNNAMED)
         self._tables: Tables = {}
         self._channels: dict[str, Channel] = {}
         self._parameters: dict[str, Parameter] = {}
@@ -112,8 +112,7 @@ class FoxgloveServer:
 
     def _publish(self, rows: Rows) -> None:
         """The latest estimate, as parameters."""
-        model = self._values.mechanism.model
-        names = [one.name for one in (*model.published, *model.physical)]
+        names = [one.name for one in self._values.mechanism.answers]
         values = {name: float(rows.columns[name][-1]) for one in names for name in (one, f"{one}_se")}
         self._parameters = {
             name: self._foxglove.Parameter(name, value=value) for name, value in values.items() if math.isfinite(value)

@@ -19,10 +19,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Names, Raw, RawCount, RefinedEstimate
+from pvid.link.names import Quantity
 from pvid.log.file import Segment
+from pvid.log.mechanism import UNNAMED, LogMechanism
 from pvid.log.reader import Account, Record, Restart
-from pvid.log.values import UNKNOWN_RIG, Rows, Values, extras_of
-from pvid.models.model import Constants, Mechanism, Model, Quantity
+from pvid.log.values import Rows, Values, extras_of
 from pvid.settings.enums import Stage
 
 Float = npt.NDArray[np.float64]
@@ -94,17 +95,17 @@ class History:
     Parameters
     ----------
     mechanism
-        Of the rig; without its constants the physical parameters stay unknown.
+        Of the rig; without its constants the outputs stay unknown.
     points
         Half of the most estimates that are kept.
     window_s
         How much of the samples is kept [s], as far as they are no more than 200 000.
     """
 
-    def __init__(self, mechanism: Mechanism = UNKNOWN_RIG, points: int = 400, window_s: float = 10.0) -> None:
+    def __init__(self, mechanism: LogMechanism = UNNAMED, points: int = 400, window_s: float = 10.0) -> None:
         self.window_s = window_s
         self.hello: Hello | None = None
-        self._values = Values(mechanism, follows=mechanism is UNKNOWN_RIG)
+        self._values = Values(mechanism, follows=mechanism is UNNAMED)
         self._aside: list[Record | _Point] = []
         self._aside_samples = 0
         self._points: dict[str, Thinned[_Point]] = {"estimates": Thinned(points), "refined": Thinned(points)}
@@ -115,22 +116,17 @@ class History:
         self._count = 0
         self._began: int | None = None
 
-    def know(self, mechanism: Mechanism) -> None:
+    def know(self, mechanism: LogMechanism) -> None:
         """That of the rig, once it is known."""
-        self._values.follows = False
-        self._change(mechanism)
+        self._work_off()
+        self._values.follows, self._values.mechanism = False, mechanism
+        self._forget()
 
     @property
-    def model(self) -> Model:
-        """The mechanism's."""
+    def mechanism(self) -> LogMechanism:
+        """That of the rig, or the one that the board named last."""
         self._work_off()
-        return self._values.mechanism.model
-
-    @property
-    def constants(self) -> Constants | None:
-        """Those of the rig; None: they are not known."""
-        self._work_off()
-        return self._values.mechanism.constants
+        return self._values.mechanism
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -143,16 +139,9 @@ class History:
         return tuple(name for name, column in columns if column.kind == "f8" and name != "t")
 
     @property
-    def has_physical(self) -> bool:
-        """Whether the physical parameters can be computed."""
-        return self._values.mechanism.constants is not None and bool(self.model.physical)
-
-    @property
     def is_physical(self) -> bool:
         """Whether the newest estimate lies in the physical region; so it is called where that cannot be known."""
-        return not self.has_physical or all(
-            math.isfinite(self.published.get(name, 0.0)) for name in self.model.physical_names
-        )
+        return all(math.isfinite(self.published.get(one.name, 0.0)) for one in self.mechanism.outputs)
 
     @property
     def newest(self) -> dict[str, float]:
@@ -183,7 +172,7 @@ class History:
     def extras(self) -> tuple[Quantity, ...]:
         """Refined parameters that the weak form does not have."""
         self._work_off()
-        return extras_of(self.model, self._values.refined)
+        return extras_of(self.mechanism, self._values.refined)
 
     @property
     def reason(self) -> str:
@@ -238,7 +227,7 @@ class History:
         """The last `window_s` of t [s] and the channels: [1 + channels, n]."""
         self._work_off()
         if not self._samples:
-            return np.zeros((1 + len(self.model.channels), 0))
+            return np.zeros((1 + len(self.mechanism.samples), 0))
         joined = np.concatenate(self._samples, axis=1)
         return np.asarray(joined[:, joined[0] > joined[0, -1] - self.window_s])
 
@@ -251,20 +240,14 @@ class History:
         wanted = (one for one in aside if not isinstance(one, _Point) or one in kept)
         for one in _joined(wanted):
             record = one.record if isinstance(one, _Point) else one
-            model = self.model
+            mechanism = self.mechanism
             for rows in self._values.rows(record):
                 if rows.table == "samples":
                     self._take_samples(rows)
                 elif isinstance(one, _Point):
                     self._take_estimate(one, rows)
-            if self.model is not model:
+            if self.mechanism is not mechanism:
                 self._forget()
-
-    def _change(self, mechanism: Mechanism) -> None:
-        self._work_off()
-        model, self._values.mechanism = self.model, mechanism
-        if self.model.p_names != model.p_names or len(self.model.channels) != len(model.channels):
-            self._forget()
 
     def _forget(self) -> None:
         """What was computed of another mechanism."""
@@ -282,7 +265,7 @@ class History:
         return np.asarray((log_time - self._began) / 1e9)
 
     def _take_samples(self, rows: Rows) -> None:
-        names = ("log_time", *(one.name for one in self.model.channels))
+        names = ("log_time", *(one.name for one in self.mechanism.samples))
         log_time, *channels = (rows.columns[name][-_MOST_SAMPLES:] for name in names)
         if not len(log_time):
             return

@@ -20,8 +20,8 @@ from itertools import cycle
 from typing import Any
 from xml.etree import ElementTree
 
+from pvid.log.mechanism import LogMechanism
 from pvid.log.values import tables_of
-from pvid.models.model import Mechanism
 
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#17becf", "#8c564b", "#e377c2")
 
@@ -36,18 +36,16 @@ class Plot:
     colour: str
 
 
-def plots_of(mechanism: Mechanism) -> dict[str, list[Plot]]:
-    """The plots by the title of their page. Without the constants of a rig there are no physical parameters."""
-    model = mechanism.model
-    physical = () if mechanism.constants is None else model.physical
-    estimated = [one.name for one in (*physical, *model.published)]
+def plots_of(mechanism: LogMechanism) -> dict[str, list[Plot]]:
+    """The plots by the title of their page."""
+    estimated = [one.name for one in mechanism.answers]
     pages = {
-        "samples": ("samples", [one.name for one in model.channels]),
+        "samples": ("samples", [one.name for one in mechanism.samples]),
         "estimates": ("estimates", estimated),
         "standard errors": ("estimates", [f"{name}_se" for name in estimated]),
         "quality": ("estimates", ["kappa", "residual", "updates"]),
     }
-    tables = tables_of(model)
+    tables = tables_of(mechanism)
 
     def plots(table: str, names: Sequence[str]) -> list[Plot]:
         units = [tables[table][name].unit for name in names]
@@ -58,7 +56,7 @@ def plots_of(mechanism: Mechanism) -> dict[str, list[Plot]]:
     return {title: plots(*page) for title, page in pages.items()}
 
 
-def plotjuggler(mechanism: Mechanism) -> str:
+def plotjuggler(mechanism: LogMechanism) -> str:
     """XML: a tab for each page, its plots in one or two columns."""
     root = ElementTree.Element("root")
     tabs = ElementTree.SubElement(root, "tabbed_widget", {"name": "Main Window", "parent": "main_window"})
@@ -96,7 +94,7 @@ def _dock_area(parent: ElementTree.Element, plot: Plot) -> None:
     ElementTree.SubElement(drawn, "curve", name=f"/{plot.table}/{plot.field}", color=plot.colour)
 
 
-def foxglove(mechanism: Mechanism) -> str:
+def foxglove(mechanism: LogMechanism) -> str:
     """JSON: one panel with a tab for each page, its plots in one or two columns."""
     panels: dict[str, Any] = {}
     tabs = []
@@ -148,4 +146,4 @@ def _tree(nodes: Sequence[Any], direction: str) -> Any:
     return {"direction": direction, "first": first, "second": _tree(rest, direction), "splitPercentage": share}
 
 
-LAYOUTS: Mapping[str, Callable[[Mechanism], str]] = {"plotjuggler": plotjuggler, "foxglove": foxglove}
+LAYOUTS: Mapping[str, Callable[[LogMechanism], str]] = {"plotjuggler": plotjuggler, "foxglove": foxglove}

@@ -21,9 +21,9 @@ from pvid.base.errors import PvidError
 from pvid.base.hosts import Address, addresses
 from pvid.link.frames import Loss
 from pvid.log.foxglove import FoxgloveServer
+from pvid.log.mechanism import UNNAMED, LogMechanism
 from pvid.log.reader import Account, Observer, Record
-from pvid.log.values import UNKNOWN_RIG, Column, Rows, Tables, Values
-from pvid.models.model import Mechanism
+from pvid.log.values import Column, Rows, Tables, Values
 
 SCHEMES = ("udp", "teleplot", "foxglove")
 _TABLES = ("samples", "estimates", "refined")
@@ -31,13 +31,13 @@ _LEFT_OUT = ("segment", "run", "log_time", "tick")
 _TELEPLOT_ROWS = 8  # a row of samples is at most 3 points of 46 bytes
 
 
-def live_stream(address: str, mechanism: Mechanism = UNKNOWN_RIG) -> Observer:
+def live_stream(address: str, mechanism: LogMechanism = UNNAMED) -> Observer:
     """The observer that sends to `udp://host:port`, `teleplot://host:port` or serves `foxglove://host:port`.
 
     Parameters
     ----------
     mechanism
-        Of the rig; without its constants no physical parameters are sent.
+        Of the rig; without its constants no outputs are sent.
 
     Raises
     ------
@@ -66,9 +66,9 @@ class LiveStream:
     what does not get through is lost, as UDP is.
     """
 
-    def __init__(self, to: Address, mechanism: Mechanism, teleplot: bool) -> None:
+    def __init__(self, to: Address, mechanism: LogMechanism, teleplot: bool) -> None:
         self._teleplot = teleplot
-        self._values = Values(mechanism, follows=mechanism is UNKNOWN_RIG)
+        self._values = Values(mechanism, follows=mechanism is UNNAMED)
         self._socket = socket.socket(to[0], socket.SOCK_DGRAM)
         self._to = to[1]
 

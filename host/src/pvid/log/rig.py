@@ -16,11 +16,11 @@ from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
 from pvid.link.frames import Hello, Names
 from pvid.link.names import BoardNames
-from pvid.log.board_model import mechanism_of
+from pvid.log.mechanism import UNNAMED, LogMechanism, mechanism_described, mechanism_named
 from pvid.log.reader import LogReader, LogStream
-from pvid.log.values import UNKNOWN_RIG, Values, is_rate
-from pvid.models.model import Mechanism
-from pvid.models.registry import MODELS, shipped
+from pvid.log.values import Values, is_rate
+from pvid.models.registry import names as names_of_shipped
+from pvid.models.registry import shipped
 from pvid.rig.columns import Columns
 from pvid.rig.former import mechanism_of_former
 from pvid.rig.mechanism_file import parsed_file
@@ -72,9 +72,9 @@ def document_of_log(path: Path) -> dict[str, Any] | None:
     return {key: value for key, value in toml_document(text).items() if key != "engine"}
 
 
-def mechanism_of_log(path: Path, rig_path: Path | None = None) -> Mechanism:
+def mechanism_of_log(path: Path, rig_path: Path | None = None) -> LogMechanism:
     """The mechanism of a log: that of its rig, or of a rig file, with the constants in it, else the first one that the
-    board named; UNKNOWN_RIG if none did.
+    board named; UNNAMED if none did.
 
     Raises
     ------
@@ -91,8 +91,8 @@ def mechanism_of_log(path: Path, rig_path: Path | None = None) -> Mechanism:
         return found
     for names in _names_of_log(path):
         with suppress(PvidError):
-            return mechanism_of(names.text)
-    return UNKNOWN_RIG
+            return mechanism_named(names.text)
+    return UNNAMED
 
 
 def named_in(document: Mapping[str, Any]) -> str | None:
@@ -102,15 +102,15 @@ def named_in(document: Mapping[str, Any]) -> str | None:
     return name if isinstance(name, str) else mechanism_of_former(document)
 
 
-def mechanism_in(document: Mapping[str, Any]) -> Mechanism | None:
-    """The mechanism of a rig file, of today or of a former version, with the constants in it; None: the file does not
-    name one that has outputs of its own."""
-    model, known = MODELS.get(named_in(document) or ""), document.get("known")
-    if model is None:
+def mechanism_in(document: Mapping[str, Any]) -> LogMechanism | None:
+    """The shipped mechanism of a rig file, of today or of a former version, with the constants in it; None: it names
+    none, or a model file, which does not run."""
+    name, known = named_in(document), document.get("known")
+    if name not in names_of_shipped():
         return None
-    given = {**(known if isinstance(known, Mapping) else {}), **document}
-    constants = {one.name: given[one.name] for one in model.constants if isinstance(given.get(one.name), int | float)}
-    return Mechanism(model, constants if len(constants) == len(model.constants) else None)
+    from pvid.models.mechanisms import described  # loads SymPy
+
+    return mechanism_described(name, described(name), {**(known if isinstance(known, Mapping) else {}), **document})
 
 
 def _names_of_log(path: Path) -> Iterator[Names]:
@@ -177,16 +177,16 @@ def recording_of_log(path: Path, names: Sequence[str]) -> Recording:
         When the log cannot be read, the board's sample rate is unknown, it has other samples or too few.
     """
     mechanism = mechanism_of_log(path)
-    named = [one.name for one in mechanism.model.channels]
+    named = [one.name for one in mechanism.samples]
     if lacking := [name for name in names if name not in named]:
-        raise PvidError(f"{path} is a log of {mechanism.model.name}: it has {listed(named)}, and not {listed(lacking)}")
+        raise PvidError(f"{path} is a log of {mechanism.name}: it has {listed(named)}, and not {listed(lacking)}")
     (t, *signals), rate = _longest(path, mechanism, names)
     if (there := int(np.isfinite(signals).all(axis=0).sum())) < MIN_ROWS:
         raise PvidError(f"{path} holds {there} samples in a row; a recording needs at least {MIN_ROWS}")
     return Recording(t, dict(zip(names, signals, strict=True)), rate)
 
 
-def _longest(path: Path, mechanism: Mechanism, names: Sequence[str]) -> tuple[npt.NDArray[np.float64], float]:
+def _longest(path: Path, mechanism: LogMechanism, names: Sequence[str]) -> tuple[npt.NDArray[np.float64], float]:
     """t and these samples of the longest stretch without a gap [1 + names, ticks], NaN for what is no number or no
     rig's; and the sample rate."""
     hello = hello_of_log(path)

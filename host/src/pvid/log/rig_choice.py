@@ -112,7 +112,7 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
         Where none has, or several have.
     """
     if run_path is not None and run_path.suffix == LOG_SUFFIX:
-        return mechanism_of_log(run_path).model.name
+        return mechanism_of_log(run_path).name
     if read is None and run_path is not None:
         read = partial(read_recording, run_path, None)
     if read is None:

@@ -8,10 +8,9 @@ from typing import TextIO
 
 from pvid.base.errors import PvidError
 from pvid.link.frames import Estimate, EstimateQ31, Hello, Names, RefinedEstimate
-from pvid.log.board_model import mechanism_of
+from pvid.log.mechanism import UNNAMED, LogMechanism, mechanism_named
 from pvid.log.reader import Account, Record
-from pvid.log.values import UNKNOWN_RIG, in_si
-from pvid.models.model import Model
+from pvid.log.values import in_si
 from pvid.settings.enums import Reason, Stage
 
 _ON_TERMINAL_S = 0.25
@@ -21,9 +20,9 @@ _ELSEWHERE_S = 10.0
 class StatusLine:
     """An observer that writes to a stream, standard error in general."""
 
-    def __init__(self, to: TextIO, model: Model = UNKNOWN_RIG.model) -> None:
-        self._model = model
-        self._follows = model is UNKNOWN_RIG.model
+    def __init__(self, to: TextIO, mechanism: LogMechanism = UNNAMED) -> None:
+        self._mechanism = mechanism
+        self._follows = mechanism is UNNAMED
         self._to = to
         self._terminal = to.isatty()
         self._period = _ON_TERMINAL_S if self._terminal else _ELSEWHERE_S
@@ -41,7 +40,7 @@ class StatusLine:
             self._refined = record.item
         elif isinstance(record.item, Names) and self._follows:
             with suppress(PvidError):
-                self._model, self._estimate = mechanism_of(record.item.text).model, None
+                self._mechanism, self._estimate = mechanism_named(record.item.text), None
                 self._refined = None
 
     def idle(self, account: Account) -> None:
@@ -73,7 +72,7 @@ class StatusLine:
             refined, p = self._refined, in_si(estimate, hello)[0]
             if is_refined := refined is not None and refined.stage == Stage.REFINED:
                 p = refined.of_p[0]
-            numbers = zip(self._model.parameters[: self._model.n_mapped], p, strict=False)
+            numbers = zip(self._mechanism.parameters[: hello.n_p], p, strict=False)
             values = ", ".join(f"{one.name} {value:.5g} {one.unit}".rstrip() for one, value in numbers)
             reason = Reason(estimate.reason).text if estimate.reason in list(Reason) else str(estimate.reason)
             text += f"; tick {self._tick}: {values}, {'refined' if is_refined else reason}"

@@ -38,20 +38,15 @@ from pvid.link.frames import (
     RefinedEstimate,
     Status,
 )
-from pvid.link.names import BoardNames
-from pvid.log.board_model import TAKEN, mechanism_of
+from pvid.link.names import BoardNames, Quantity
 from pvid.log.file import Close, Segment
+from pvid.log.mechanism import TAKEN, UNNAMED, LogMechanism, mechanism_named
 from pvid.log.reader import Gap, Record, Restart
-from pvid.models.model import Mechanism, Model, Quantity
-from pvid.models.registry import DEFAULT, MODELS
 from pvid.settings.enums import Reason, Stage
 
 _SLOWEST, _FASTEST = 1e-3, 1e9  # [Hz]
 _LONGEST_S = 3e9  # between the PC's clock and a tick: a century, which a time in ns has room for
 _MOST = (1 << 63) - 1
-
-UNKNOWN_RIG = Mechanism(MODELS[DEFAULT])  # of a log without a rig file
-
 
 Tables = Mapping[str, Mapping[str, "Column"]]
 
@@ -92,9 +87,9 @@ def _number(of: Quantity, what: str) -> Column:
     return Column(of.unit or "1", "f8", what)
 
 
-def extras_of(model: Model, refined: Sequence[Quantity]) -> tuple[Quantity, ...]:
+def extras_of(mechanism: LogMechanism, refined: Sequence[Quantity]) -> tuple[Quantity, ...]:
     """Refined parameters that the weak form does not have, as friction; none with the name of another column."""
-    taken = {*TAKEN, *_OF_REFINED, *(f"{one.name}{end}" for one in model.answers for end in ("", "_se"))}
+    taken = {*TAKEN, *_OF_REFINED, *(f"{one.name}{end}" for one in mechanism.answers for end in ("", "_se"))}
     return tuple(one for one in refined if not taken & {one.name, f"{one.name}_se"})
 
 
@@ -102,11 +97,11 @@ _OF_REFINED = ("stage", "number", "level", "clash")
 
 
 @lru_cache(maxsize=64)
-def tables_of(model: Model, refined: tuple[Quantity, ...] = ()) -> Tables:
-    """The tables of a model's logs; with the refined parameters of a board that has a second stage."""
-    estimated = (*model.published, *model.physical)
+def tables_of(mechanism: LogMechanism, refined: tuple[Quantity, ...] = ()) -> Tables:
+    """The tables of a mechanism's logs; with the refined parameters of a board that has a second stage."""
+    estimated = (*mechanism.parameters, *mechanism.outputs)
     tables = {
-        "samples": {**_WHERE, **{one.name: _number(one, f"measured {one.meaning}") for one in model.channels}},
+        "samples": {**_WHERE, **{one.name: _number(one, "measured") for one in mechanism.samples}},
         "estimates": {
             **_WHERE,
             "updates": Column("1", "i8", "solves so far"),
@@ -120,7 +115,7 @@ def tables_of(model: Model, refined: tuple[Quantity, ...] = ()) -> Tables:
         "events": _EVENTS,
     }
     if refined:
-        of_r = (*estimated, *extras_of(model, refined))
+        of_r = (*estimated, *extras_of(mechanism, refined))
         tables["refined"] = {
             **_WHERE,
             "stage": Column("", "U8", "whose estimate is published: that of the table estimates (weak), or this one"),
@@ -148,7 +143,7 @@ class Values:
     Parameters
     ----------
     mechanism
-        Of the rig file; without its constants no physical parameters are computed.
+        Of the rig; without its constants no outputs are computed.
     hello
         Who the board is, where that is known before its records; without it times are NaN until it has said so.
     follows
@@ -159,7 +154,7 @@ class Values:
 
     def __init__(
         self,
-        mechanism: Mechanism = UNKNOWN_RIG,
+        mechanism: LogMechanism = UNNAMED,
         hello: Hello | None = None,
         *,
         follows: bool = False,
@@ -174,6 +169,7 @@ class Values:
         self._row_sd = math.nan
         self._offset = 0.0  # of the angle in fixed point [rad]
         self._named: tuple[str, ...] = ()  # the samples of a tick, if the board named them
+        self._named_p: tuple[str, ...] = ()  # entries of p, likewise
         self._counts: tuple[float, ...] = ()  # value of a count of each, likewise
         self._anchor: tuple[int, int] | None = None  # tick and log time
         self._latest = 0
@@ -184,7 +180,7 @@ class Values:
     @property
     def tables(self) -> Tables:
         """The columns of each table."""
-        return tables_of(self.mechanism.model, self.refined)
+        return tables_of(self.mechanism, self.refined)
 
     @property
     def sample_rate(self) -> float:
@@ -208,10 +204,12 @@ class Values:
                 with suppress(PvidError):  # a board that names nothing that there can be
                     names = BoardNames.parse(item.text)
                     self._named, self._counts = tuple(name for name, _ in names.samples), names.counts
-                    self._names_refined = tuple(name for name, _ in names.refined)
+                    self._named_p, self._names_refined = (
+                        tuple(name for name, _ in some) for some in (names.parameters, names.refined)
+                    )
                     if self._refined_follows:
-                        self.refined = refined_of(names)
-                    self.mechanism = mechanism_of(item.text) if self.follows else self.mechanism
+                        self.refined = names.refined
+                    self.mechanism = mechanism_named(item.text) if self.follows else self.mechanism
             case Configure() | ConfigureQ31():
                 self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
                 self._offset = getattr(item, "phi_offset", 0) * (self._hello.phi_lsb if self._hello else 0.0)
@@ -283,10 +281,11 @@ class Values:
         of_two = [np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]
         measured = item.in_si(np.array(self._counts or of_two))
         columns = self._where(record, record.tick + np.arange(len(measured), dtype=np.int64))
-        channels = [one.name for one in self.mechanism.model.channels]
+        channels = [one.name for one in self.mechanism.samples]
         if measured.shape[1] != len(channels):  # samples of something else
             measured = np.full((len(measured), len(channels)), np.nan)
-        order = self._named if sorted(self._named) == sorted(channels) else channels
+        orders = self._named, [one.name for one in UNNAMED.samples]
+        order = next((one for one in orders if sorted(one) == sorted(channels)), channels)
         if not self._named and hello is not None and hello.form == Form.WEAK:  # not named yet
             measured = np.full(measured.shape, np.nan)
         return Rows("samples", {**columns, **dict(zip(order, measured.T, strict=True))})
@@ -305,7 +304,7 @@ class Values:
         numbers: dict[str, Any] = dict.fromkeys(self.tables["refined"], np.nan)
         if item.stage == Stage.REFINED:
             numbers |= self._answers(*item.of_p)
-            extras = {one.name for one in extras_of(self.mechanism.model, self.refined)}
+            extras = {one.name for one in extras_of(self.mechanism, self.refined)}
             for name, r, se in zip(self._names_refined, item.r, item.se, strict=False):
                 if name in extras:
                     numbers[name], numbers[f"{name}_se"] = r, se
@@ -315,24 +314,14 @@ class Values:
         return self._one("refined", record, **{**numbers, "stage": stage, "number": item.number, "reason": reason})
 
     def _answers(self, p: npt.NDArray[np.float64], covariance: npt.NDArray[np.float64]) -> dict[str, float]:
-        """Published and physical parameters with their standard errors, from p [MAX_P] and its covariance."""
-        model = self.mechanism.model
-        n_p = min(MAX_P if self._hello is None else self._hello.n_p, len(model.published))
-        numbers: dict[str, Any] = {}
-        errors = np.sqrt(np.diag(covariance))
-        for i, name in enumerate(model.p_names[:n_p]):
-            numbers[name], numbers[f"{name}_se"] = p[i], errors[i]
-        physical = self.mechanism.physical(p)
-        if np.isfinite(physical).all():
-            of_physical = self.mechanism.physical_errors(p, covariance)
-            for i, name in enumerate(model.physical_names):
-                numbers[name], numbers[f"{name}_se"] = physical[i], of_physical[i]
-        return numbers
-
-
-def refined_of(names: BoardNames) -> tuple[Quantity, ...]:
-    """The refined parameters that a board names."""
-    return tuple(Quantity(name, unit, f"refined {name}") for name, unit in names.refined)
+        """Parameters and outputs with their standard errors, from p [MAX_P] and its covariance."""
+        own = [one.name for one in self.mechanism.parameters]
+        names = (self._named_p or own)[: MAX_P if self._hello is None else self._hello.n_p]
+        values = dict(zip(names, p.tolist(), strict=False))
+        errors = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=False))
+        found = {name: (x, errors[name]) for name, x in values.items() if name in own}
+        found |= self.mechanism.outputs_at(values, covariance)
+        return {**{name: x for name, (x, _) in found.items()}, **{f"{name}_se": se for name, (_, se) in found.items()}}
 
 
 def is_rate(sample_rate: float) -> bool:

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from pvid.base.errors import PvidError
 from pvid.link.frames import Code, Core, Form, Hello, Names, Status
-from pvid.log.board_model import mechanism_of
+from pvid.log.mechanism import mechanism_named
 from pvid.log.reader import Account
 from pvid.settings.enums import Reason, Stage
 from pvid.settings.forms import FORMS
@@ -69,7 +69,7 @@ def _mechanism(account: Account) -> str:
     names = account.lasting.get(Names)
     with suppress(PvidError):
         if isinstance(names, Names):
-            return mechanism_of(names.text).model.name
+            return mechanism_named(names.text).name
     return "an unnamed mechanism"
 
 

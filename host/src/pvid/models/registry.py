@@ -6,29 +6,14 @@ file, a log) contain `str` alone; `asked_for` alone makes a `Path`, of what the 
 
 from __future__ import annotations
 
-import importlib
 import os
-import pkgutil
 from pathlib import Path, PureWindowsPath
 
-import pvid.models
 from pvid.base.errors import PvidError
 from pvid.base.wording import printable
-from pvid.models.model import Model
 
-DEFAULT = "kapitza"  # where no mechanism is named; its folder defines MODEL
 DESCRIPTION = "mechanism.py"  # of a shipped mechanism, in its folder
 _FOLDER = Path(__file__).parent
-
-
-def _found() -> dict[str, Model]:
-    folders = [one.name for one in pkgutil.iter_modules(pvid.models.__path__) if one.ispkg]
-    packages = [importlib.import_module(f"pvid.models.{name}") for name in sorted(folders)]
-    models: list[Model] = [package.MODEL for package in packages if hasattr(package, "MODEL")]
-    return {model.name: model for model in models}
-
-
-MODELS = _found()
 
 
 def names() -> tuple[str, ...]:

@@ -14,13 +14,36 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, shown
-from pvid.models.model import Channel
-from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.units import Scale, is_unit, scale_to, spelled, usual
 
 FloatArray = npt.NDArray[np.float64]
 
-_TIME = Channel("t", "s", "time", usual_names=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
+
+@dataclass(frozen=True)
+class Channel:
+    """A signal that a recording is to have.
+
+    Attributes
+    ----------
+    name, unit : the unit in SI
+    held : it keeps each value until the next one: a blank cell is no change
+    usual : regular expression of likely names of its column; "": its own name, which may carry a unit, and those that
+        people give a signal of its unit
+    """
+
+    name: str
+    unit: str
+    held: bool = False
+    usual: str = ""
+
+    def is_called(self, name: str) -> bool:
+        """Whether a column of this name is likely to be the signal."""
+        own = rf"^{re.escape(self.name)}([\s_(\[].*)?$"
+        usual = self.usual or "|".join(filter(None, (own, _USUAL_NAMES.get(self.unit))))
+        return re.search(usual, name, re.I) is not None
+
+
+_TIME = Channel("t", "s", usual=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
 
 # What people call a signal of a unit, besides its own name.
 _USUAL_NAMES = {
@@ -76,11 +99,11 @@ class Columns:
     Attributes
     ----------
     named : by signal
-    channels : the signals to find, without the time; those of the pendulum unless given
+    channels : the signals to find, without the time
     """
 
+    channels: tuple[Channel, ...]
     named: Mapping[str, Column] = field(default_factory=lambda: MappingProxyType({}))
-    channels: tuple[Channel, ...] = MODELS[DEFAULT].channels
 
     @property
     def units(self) -> dict[str, str]:
@@ -96,7 +119,7 @@ class Columns:
         return self.named.get(signal, Column(signal))
 
     @classmethod
-    def parse(cls, text: str, channels: tuple[Channel, ...] = MODELS[DEFAULT].channels) -> Columns:
+    def parse(cls, text: str, channels: tuple[Channel, ...]) -> Columns:
         """Reads `SIGNAL=COLUMN[:UNIT],...`.
 
         COLUMN is a name in the file's header, in double quotes where it has a comma, a colon or a quote of its own
@@ -110,7 +133,7 @@ class Columns:
             When the text is none, naming the part.
         """
         named: dict[str, Column] = {}
-        units = cls(channels=channels).units
+        units = cls(channels).units
         for part in _PART.findall(text) or [""]:
             match = _ASSIGNED.fullmatch(part)
             name = "" if match is None else (match["name"] or (match["quoted"] or "").replace('""', '"')).strip()
@@ -125,7 +148,7 @@ class Columns:
                 raise PvidError(f"--columns: {signal} is given twice")
             unit = match["unit"]
             named[signal] = Column(name) if unit is None else _column(signal, name, units[signal], unit.strip())
-        return cls(MappingProxyType(named), channels)
+        return cls(channels, MappingProxyType(named))
 
     def in_units_of_file(self, units: Mapping[str, str]) -> tuple[Columns, tuple[str, ...]]:
         """With the units that a file states for signals, where none was typed; and a sentence on each that was used or
@@ -189,22 +212,18 @@ class Columns:
             )
         return places
 
-    def _looks_like(self, signal: str, name: str) -> bool:
-        """Whether people call the signal so."""
-        usual = next(one.usual_names for one in (_TIME, *self.channels) if one.name == signal)
-        return re.search(usual, name, re.I) is not None
-
     def _suggestion(self, names: Sequence[str], places: Mapping[str, int]) -> str:
         """The text for --columns that is likely to be meant; a signal whose column cannot be guessed is NAME."""
         taken = set(places.values())
         parts = []
         numbered = list(names) == [str(k + 1) for k in range(len(names))]  # the file has no names
-        for order, (signal, unit) in enumerate(self.units.items()):
+        for order, channel in enumerate((_TIME, *self.channels)):
+            signal, unit = channel.name, channel.unit
             place: int | None = places.get(signal)
             if place is None and numbered and order < len(names):
                 place = order
             elif place is None:
-                alike = (k for k, name in enumerate(names) if k not in taken and self._looks_like(signal, name))
+                alike = (k for k, name in enumerate(names) if k not in taken and channel.is_called(name))
                 place = next(alike, None)
             elif signal not in self.named:
                 continue
@@ -224,16 +243,9 @@ class MissingColumnError(PvidError):
     """A file has no column for a signal."""
 
 
-def channel_of(name: str, unit: str, held: bool) -> Channel:
-    """A signal that a recording is to have; a column's name may carry a unit behind the signal's."""
-    own = rf"^{re.escape(name)}([\s_(\[].*)?$"
-    usual = _USUAL_NAMES.get(unit)
-    return Channel(name, unit, name, usual_names=own if usual is None else f"{own}|{usual}", held=held)
-
-
-def parsed(text: str | None, channels: tuple[Channel, ...] = MODELS[DEFAULT].channels) -> Columns:
+def parsed(text: str | None, channels: tuple[Channel, ...]) -> Columns:
     """Columns of the text of --columns, or of their own names; see `Columns.parse`."""
-    return Columns(channels=channels) if text is None else Columns.parse(text, channels)
+    return Columns(channels) if text is None else Columns.parse(text, channels)
 
 
 def _column(signal: str, name: str, si: str, text: str) -> Column:

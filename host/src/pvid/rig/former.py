@@ -25,6 +25,11 @@ def mechanism_of_former(document: Mapping[str, Any]) -> str | None:
     return None
 
 
+def names_of_former_board() -> str:
+    """What the boards of version 0.1, which all were of one mechanism and named nothing, would say about it."""
+    return next(str(former.NAMES_OF_BOARD) for name in names() if (former := _former_of(name)) is not None)
+
+
 def translated(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     """The tables of a file with the keys of today; `name`: of its mechanism.
 

@@ -36,8 +36,7 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import MOST_BYTES, TOO_LONG, NotATableError, copied, key_and_value, put, quoted, toml_document
 from pvid.base.wording import listed, shown
-from pvid.models.model import Channel
-from pvid.rig.columns import channel_of
+from pvid.rig.columns import Channel
 
 if TYPE_CHECKING:  # it loads SymPy
     from pvid.model.compiled import CompiledModel, Unknown
@@ -257,9 +256,7 @@ def parsed_file(path: str | Path, parse: Callable[[str], _Read]) -> _Read:
 
 def channels_of(model: CompiledModel | Description) -> tuple[Channel, ...]:
     """The signals of a model as channels of a recording."""
-    return tuple(
-        channel_of(one.name, one.unit, held=one.kind == "input" and one.hold == "zoh") for one in model.signals
-    )
+    return tuple(Channel(one.name, one.unit, held=one.kind == "input" and one.hold == "zoh") for one in model.signals)
 
 
 def with_settings(document: Mapping[str, Any], settings: Iterable[str]) -> dict[str, Any]:

@@ -1,10 +1,9 @@
 """Recorded runs on disk: text tables, arrays, workbooks and messages, with every check a stranger's file needs.
 
-A recording has the column ``t`` [s] and one for each signal of its mechanism (of the pendulum ``phi`` [rad] and ``y``
-[m]), in any order and among others; `Columns` maps other names and units. Jumps of a whole turn are joined (`turns`),
-its clock is made uniform (`clock`) and short gaps are interpolated (`gaps`). `Recording.notes` lists the corrections; a
-recording that needs none keeps every bit. A fault of a file raises a `PvidError` of one sentence with the file and, if
-known, the line and the column.
+A recording has the column ``t`` [s] and one for each signal of its mechanism, in any order and among others; `Columns`
+maps other names and units. Jumps of a whole turn are joined (`turns`), its clock is made uniform (`clock`) and short
+gaps are interpolated (`gaps`). `Recording.notes` lists the corrections; a recording that needs none keeps every bit. A
+fault of a file raises a `PvidError` of one sentence with the file and, if known, the line and the column.
 """
 
 from __future__ import annotations
@@ -21,11 +20,9 @@ import numpy.typing as npt
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, reason
-from pvid.models.model import Channel
-from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.array_table import read_arrow, read_npz, read_parquet, table_of, write_npz, write_parquet
 from pvid.rig.clock import Uniform, uniform
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Channel, Columns
 from pvid.rig.csv_table import read_csv, write_csv, write_csv_gz
 from pvid.rig.excel_table import read_excel
 from pvid.rig.gaps import (
@@ -154,80 +151,16 @@ class Recording:
         return replace(self, t=t, signals=signals, notes=(*self.notes, note), origins=())
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """A recording of the pendulum.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        Time [s].
-    phi : ndarray, shape (n,)
-        Measured relative angle [rad]; NaN at a tick without a sample.
-    y : ndarray, shape (n,)
-        Measured height of the pivot [m]; NaN likewise.
-    sample_rate : float
-        [Hz].
-    notes : tuple of str
-        As of a `Recording`.
-    """
-
-    t: FloatArray
-    phi: FloatArray
-    y: FloatArray
-    sample_rate: float
-    notes: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for name in ("t", "phi", "y"):
-            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64))
-        for name in ("t", "phi", "y"):
-            data = getattr(self, name)
-            if data.ndim != 1 or data.size != self.t.size:
-                raise PvidError(f"A run's column {name} must hold one number a sample ({self.t.size}).")
-
-    def __len__(self) -> int:
-        return int(self.t.size)
-
-    @classmethod
-    def of(cls, recording: Recording) -> Run:
-        """A recording with the signals phi and y."""
-        phi, y = (recording.signals[name] for name in ("phi", "y"))
-        return cls(recording.t, phi, y, recording.sample_rate, recording.notes)
-
-    @property
-    def recording(self) -> Recording:
-        """The same as a recording of any mechanism."""
-        return Recording(self.t, {"phi": self.phi, "y": self.y}, self.sample_rate, self.notes)
-
-    def refuse_damaged(self) -> None:
-        """See `Recording`."""
-        self.recording.refuse_damaged()
-
-    def whole(self) -> Run:
-        """See `Recording`; this run when no tick is missing."""
-        recording = self.recording
-        whole = recording.whole()
-        return self if whole is recording else Run.of(whole)
-
-
-def read_run(path: str | os.PathLike[str], rate: float | None = None, columns: Columns | None = None) -> Run:
-    """Read a run of the pendulum; see `read_recording`."""
-    return Run.of(read_recording(path, rate, columns))
-
-
-def read_recording(
-    path: str | os.PathLike[str], rate: float | None = None, columns: Columns | None = None
-) -> Recording:
+def read_recording(path: str | os.PathLike[str], rate: float | None, columns: Columns) -> Recording:
     """Read a text table of any suffix, ``.npz``, ``.parquet``, ``.arrow``, ``.mat``, ``.h5``, ``.xlsx`` or ``.mcap``.
 
     Parameters
     ----------
     path : path
-    rate : float, optional
+    rate : float or None
         The sample rate the rig file promises [Hz].
-    columns : Columns, optional
-        Which columns are t and the signals, and their units; t, phi and y in SI by default.
+    columns : Columns
+        Which columns are t and the signals, and their units.
 
     Raises
     ------
@@ -244,7 +177,7 @@ def read_recording(
             raise PvidError(f"{path} does not exist.")
         if not path.is_file():
             raise PvidError(f"{path} is not a regular file.")
-        table = _read_as(path)(path, columns or Columns())
+        table = _read_as(path)(path, columns)
     except (OSError, ValueError) as error:
         raise PvidError(f"{path} cannot be read: {reason(error)}.") from error
     except MemoryError as error:
@@ -253,10 +186,7 @@ def read_recording(
 
 
 def recording_of_arrays(
-    named: Mapping[str, npt.ArrayLike],
-    rate: float | None = None,
-    columns: Columns | None = None,
-    name: str = "the data",
+    named: Mapping[str, npt.ArrayLike], rate: float | None, columns: Columns, name: str = "the data"
 ) -> Recording:
     """A recording of arrays by name, with the checks and corrections that a file gets.
 
@@ -273,17 +203,10 @@ def recording_of_arrays(
     """
     names = [str(one) for one in named]
     arrays = dict(zip(names, named.values(), strict=True))
-    return _recording(_checked(table_of(Path(name), names, arrays.__getitem__, columns or Columns())), rate)
+    return _recording(_checked(table_of(Path(name), names, arrays.__getitem__, columns)), rate)
 
 
-def write_run(path: str | os.PathLike[str], run: Run) -> None:
-    """Write a run of the pendulum; see `write_recording`."""
-    write_recording(path, run.recording)
-
-
-def write_recording(
-    path: str | os.PathLike[str], recording: Recording, channels: tuple[Channel, ...] = MODELS[DEFAULT].channels
-) -> None:
+def write_recording(path: str | os.PathLike[str], recording: Recording, channels: tuple[Channel, ...]) -> None:
     """Write a recording; the suffix gives the format, and `read_recording` gives every float64 back exactly.
 
     The file appears whole or not at all (temporary file, then rename), and the same recording gives the same bytes.
@@ -300,7 +223,7 @@ def write_recording(
         if not np.isfinite(data).all():
             row = int(np.argmin(np.isfinite(data)))
             raise PvidError(f"{path} is not written: {row_place(row)}, column {name}: {data[row]} is no number.")
-    table = Table(path, recording.t, recording.signals, Columns(channels=channels), row_place)
+    table = Table(path, recording.t, recording.signals, Columns(channels), row_place)
     again = _recording(_checked(table), recording.sample_rate)
     if again.notes:
         raise PvidError(f"{path} is not written: {again.notes[0]}.")

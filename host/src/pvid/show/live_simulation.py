@@ -53,12 +53,12 @@ class LiveSimulation:
         now = time.monotonic()
         if now < self._began + PERIOD_S or (self._busy is not None and self._busy.is_alive()):
             return
-        if history.model.name not in names() or not history.newest or len(t) < 100:
+        mechanism = history.mechanism
+        if mechanism.name not in names() or not history.newest or len(t) < 100:
             return
         self._began = now
-        known = {} if history.constants is None else dict(history.constants)
-        samples = dict(zip((one.name for one in history.model.channels), signals, strict=True))
-        given = (history.model.name, known, t, samples, dict(history.published))
+        samples = dict(zip((one.name for one in mechanism.samples), signals, strict=True))
+        given = (mechanism.name, mechanism.known, t, samples, dict(history.published))
         self._busy = threading.Thread(target=self._simulate, args=given, daemon=True)
         self._busy.start()
 

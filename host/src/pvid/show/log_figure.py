@@ -19,9 +19,9 @@ from matplotlib.axes import Axes
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
 from pvid.log.history import History
+from pvid.log.mechanism import LogMechanism
 from pvid.log.reader import LogReader
 from pvid.log.words import board_words, reason_words, residual_words, stage_words
-from pvid.models.model import Mechanism
 from pvid.show.axis_limits import interesting
 
 Float = npt.NDArray[np.float64]
@@ -31,7 +31,7 @@ _LINE = 130  # characters of the title
 _POINTS = 2000  # half of the most estimates that are drawn
 
 
-def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> bool:
+def write_log_figure(log: Path, mechanism: LogMechanism, path: Path) -> bool:
     """Draws it; the format follows the suffix of `path` (png, svg, pdf). False: the log has no estimate to draw.
 
     Raises
@@ -46,9 +46,9 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> bool:
     t = history.estimates("t")
     if not len(t):
         return False
-    model, extras = history.model, history.extras
-    drawn = (*model.published, *extras)
-    panels = len(drawn) + 2 + len(model.channels)
+    parameters, extras = mechanism.parameters, history.extras
+    drawn = (*parameters, *extras)
+    panels = len(drawn) + 2 + len(mechanism.samples)
     rows = -(-panels // _COLUMNS)
     figure, grid = plt.subplots(rows, _COLUMNS, squeeze=False, figsize=(13, 1.5 + 1.9 * rows), layout="constrained")
     try:
@@ -63,19 +63,19 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> bool:
                 limits += _curve(axis, *of_refined, "C1", "refined, published where drawn")
             if limits:
                 axis.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-            axis.set_ylabel(one.name_and_unit)
+            axis.set_ylabel(one.label)
         rest = axes[len(drawn) :]
         _quality(history, rest[0], rest[1])
         seconds, *signals = history.samples()
-        for channel, x, axis in zip(model.channels, signals, rest[2:], strict=False):
+        for sample, x, axis in zip(mechanism.samples, signals, rest[2:], strict=False):
             axis.plot(seconds, x, color="C1", linewidth=0.8, label=f"last {history.window_s:g} s at most")
-            axis.set_ylabel(channel.name_and_unit)
+            axis.set_ylabel(sample.label)
         for axis in axes[:panels]:
             axis.grid(alpha=0.3)
             axis.set_xlabel("time of the log [s]")
         for axis in axes[panels:]:
             axis.set_axis_off()
-        for axis in (*([axes[0], axes[len(model.published)]] if extras else [axes[0]]), *rest[2:3]):
+        for axis in (*([axes[0], axes[len(parameters)]] if extras else [axes[0]]), *rest[2:3]):
             axis.legend(loc="upper right", fontsize="small")
         lines = [f"{log.name}, {board_words(history.hello, reader.account)}", _last(history), reader.account.text]
         folded = [part for line in lines for part in textwrap.wrap(drawable(line), _LINE) or [""]]
@@ -101,14 +101,14 @@ def _quality(history: History, residual: Axes, kappa: Axes) -> None:
     residual.set_title(residual_words(history.hello), fontsize="small")
     shown = history.estimates("kappa")
     kappa.semilogy(t, np.where(shown > 0, shown, np.nan), color="C2")
-    kappa.set_ylabel(f"kappa of {history.model.p_names[0]}")
+    kappa.set_ylabel(f"kappa of {history.mechanism.parameters[0].name}")
 
 
 def _last(history: History) -> str:
     """The last estimate in words."""
     newest = history.published
     parts = []
-    for one in (*history.model.published, *history.extras):
+    for one in (*history.mechanism.parameters, *history.extras):
         if math.isfinite(newest.get(one.name, math.nan)):
             value, error = with_error(newest[one.name], newest[f"{one.name}_se"])
             parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())

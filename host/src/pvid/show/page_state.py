@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.rounding import with_error
+from pvid.base.rounding import prefix_of, with_error
 from pvid.base.toml_text import toml_document
+from pvid.link.names import Quantity
 from pvid.log.history import History, Rates, envelope
 from pvid.log.reader import LogStream
 from pvid.log.rig import mechanism_in
@@ -31,7 +32,6 @@ from pvid.log.words import (
     residual_words,
     stage_words,
 )
-from pvid.models.model import Parameter, Quantity
 from pvid.show.axis_limits import interesting
 from pvid.show.live_simulation import LiveSimulation
 
@@ -85,7 +85,7 @@ class LiveState(threading.Thread):
                     self._failed += 1
 
     def _load_rig(self) -> None:
-        """Of another version, or a described mechanism: the page does without physical parameters."""
+        """Where it is none, or names a model file, the page has the names of the board."""
         with suppress(PvidError):
             mechanism = None if self._rig is None else mechanism_in(toml_document(self._rig))
             if mechanism is not None:
@@ -126,25 +126,24 @@ class LiveState(threading.Thread):
     def _table(self) -> list[dict[str, Any]]:
         """Every answer with its standard error; `large`: the page draws its history."""
         rows: list[dict[str, Any]] = []
-        model = self._history.model
+        mechanism = self._history.mechanism
         large = {one.name for one in self._drawn()}
         published = self._history.published
-        for one in (*model.answers, *self._history.extras):
+        for one in (*mechanism.answers, *self._history.extras):
             value = published.get(one.name, math.nan)
             if not math.isnan(value):
                 shown, spread = with_error(value, published[f"{one.name}_se"])
-                row = {"symbol": one.shown, "meaning": one.meaning, "unit": one.shown_unit, "value": shown}
-                rows.append({**row, "error": f"± {spread}", "large": one.name in large})
+                row = {"name": one.name, "unit": one.shown_unit, "value": shown, "error": f"± {spread}"}
+                rows.append({**row, "large": one.name in large})
         if not self._history.is_physical:
-            meaning = "outside the physical region"
-            names = ", ".join(one.shown for one in model.physical)
-            rows.append({"symbol": names, "meaning": meaning, "unit": "", "value": "", "error": "", "large": False})
+            names = ", ".join(one.name for one in mechanism.outputs)
+            outside = {"name": names, "unit": "", "value": "outside the physical region", "error": ""}
+            rows.append({**outside, "large": False})
         return rows
 
-    def _drawn(self) -> tuple[Parameter | Quantity, ...]:
-        """The physical parameters, or the mapped ones where the rig is not known."""
-        model = self._history.model
-        return model.physical if self._history.has_physical else model.parameters[: model.n_mapped]
+    def _drawn(self) -> tuple[Quantity, ...]:
+        """The outputs; p where there are none, or the rig is not known."""
+        return self._history.mechanism.outputs or self._history.mechanism.parameters
 
     def _marks(self) -> dict[str, list[Any]]:
         """When windows were held or rejected."""
@@ -159,9 +158,7 @@ class LiveState(threading.Thread):
             stages = {"": (history.estimates(one.name), 2 * history.estimates(f"{one.name}_se"))}
             if history.stage:
                 stages["refined"] = self._at_estimates(one.name), 2 * self._at_estimates(f"{one.name}_se")
-            curve: dict[str, Any] = {
-                "label": f"{one.shown}, {one.meaning}" + (f" [{one.shown_unit}]" if one.unit else ""),
-            }
+            curve: dict[str, Any] = {"label": one.label}
             found = []
             for stage, (value, band) in stages.items():
                 for name, x in (("value", value), ("low", value - band), ("high", value + band)):
@@ -193,11 +190,14 @@ class LiveState(threading.Thread):
         t, *signals = history.samples()
         self._simulation.offer(history, t, signals)
         curves = []
-        for one, x in zip(history.model.channels, signals, strict=True):
-            times, values = envelope(t, one.shown_in[1] * x, _BINS)
-            curve: dict[str, Any] = {"label": one.label, "t": _numbers(times), "x": _numbers(values)}
+        for one, x in zip(history.mechanism.samples, signals, strict=True):
+            largest = float(np.max(np.abs(x), where=np.isfinite(x), initial=0.0))
+            unit, scale = prefix_of(largest, one.unit)
+            times, values = envelope(t, x / scale, _BINS)
+            label = Quantity(one.name, unit).label
+            curve: dict[str, Any] = {"label": label, "t": _numbers(times), "x": _numbers(values)}
             if (modelled := self._simulation.at(one.name, times)) is not None:
-                curve["modelled"] = _numbers(one.shown_in[1] * modelled)
+                curve["modelled"] = _numbers(modelled / scale)
             curves.append(curve)
         return curves
 

@@ -15,10 +15,11 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
-from pvid.base.rounding import with_error
+from pvid.base.rounding import percent, prefix_of, with_error
+from pvid.link.names import Quantity
 from pvid.log.history import History, Rates
+from pvid.log.mechanism import UNNAMED, LogMechanism
 from pvid.log.reader import Account, Record
-from pvid.log.values import UNKNOWN_RIG
 from pvid.log.words import (
     KAPPA_WEAK,
     board_words,
@@ -31,7 +32,6 @@ from pvid.log.words import (
     residual_words,
     stage_words,
 )
-from pvid.models.model import Mechanism
 
 _PERIOD_S = 0.25
 _BAR, _SHORT_BAR = 30, 18  # in a terminal of 100 columns and more, and in a narrower one
@@ -47,12 +47,12 @@ class LiveView:
     title
         What is recorded where.
     mechanism
-        Of the rig; without its constants no physical parameters are shown.
+        Of the rig; without its constants no outputs are shown.
     page
         Address of the live page; empty: none.
     """
 
-    def __init__(self, console: Console, title: str, mechanism: Mechanism = UNKNOWN_RIG, page: str = "") -> None:
+    def __init__(self, console: Console, title: str, mechanism: LogMechanism = UNNAMED, page: str = "") -> None:
         self.history = History(mechanism)
         self._console = console
         self._title = title
@@ -112,24 +112,23 @@ class LiveView:
     def _parameters(self) -> Table:
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_edge=False)
         table.add_column("parameter", min_width=8)
-        table.add_column("", style="dim")
         table.add_column("estimate", justify="right", min_width=12)
         table.add_column("± standard error", justify="left", min_width=12)
         table.add_column("in %", justify="right", min_width=8)
         published = self.history.published
-        for one in (*self.history.model.answers, *self.history.extras):
+        for one in (*self.history.mechanism.answers, *self.history.extras):
             name = one.name
             value = published.get(name, math.nan)
             error = published.get(f"{name}_se", math.nan)
             if math.isnan(value):
                 continue
-            relative = f"{100 * error / abs(value):.2g} %" if name != self.history.model.offset_name and value else ""
+            relative = percent(error / abs(value)) if error < abs(value) else ""
             shown, spread = with_error(value, error)
-            table.add_row(one.shown, one.meaning, shown, f"± {spread} {one.shown_unit}", relative)
+            table.add_row(name, shown, f"± {spread} {one.shown_unit}", relative)
         if not self.history.newest:
             table.add_row("none yet", "the first estimate follows when a window of samples is full")
         elif not self.history.is_physical:
-            names = ", ".join(one.shown for one in self.history.model.physical)
+            names = ", ".join(one.name for one in self.history.mechanism.outputs)
             table.add_row(names, "outside the physical region")
         return table
 
@@ -150,11 +149,8 @@ class LiveView:
         )
         t, *signals = history.samples()
         if len(t):
-            shown = (
-                f"{one.short} {_span(one.shown_in[1] * x)} {one.shown_unit}"
-                for one, x in zip(history.model.channels, signals, strict=True)
-            )
-            rows.add_row("motion", f"{', '.join(shown)} ({t[-1] - t[0]:.0f} s)")
+            spans = (_span(one, x) for one, x in zip(history.mechanism.samples, signals, strict=True))
+            rows.add_row("motion", f"{', '.join(spans)} ({t[-1] - t[0]:.0f} s)")
         rows.add_row("state", Text(history.reason or "no estimate yet", style="bold"))
         rows.add_row("", Text(reason_words(history.reason), style="dim"))
         if history.stage:
@@ -169,8 +165,9 @@ def _labelled() -> Table:
     return rows
 
 
-def _span(x: npt.NDArray[np.float64]) -> str:
-    return f"{x.min():+.3g} to {x.max():+.3g}"
+def _span(sample: Quantity, x: npt.NDArray[np.float64]) -> str:
+    unit, scale = prefix_of(float(np.abs(x).max()), sample.shown_unit)
+    return f"{sample.name} {x.min() / scale:+.3g} to {x.max() / scale:+.3g} {unit}".rstrip()
 
 
 def sparkline(x: npt.NDArray[np.float64], width: int) -> str:

@@ -1,4 +1,4 @@
-"""Keys of the rig file that this mechanism had of its own, up to version 0.1, and where they are now."""
+"""Keys of the rig file that this mechanism had of its own up to version 0.1, where they are now, and its boards."""
 
 MOVED = {
     "l1": "known.l1",
@@ -33,3 +33,6 @@ OF_THE_STRONG_FORM = {
 
 CHOSEN = ("test_functions", "decimation", "smoothing_s", "pass_hz", "disturbance", "survey", "full_angle", "damping")
 """Keys of [identifier] that an identification has chosen by itself for long; `zero` is estimated always."""
+
+NAMES_OF_BOARD = "kapitza\nsample phi rad\nsample y m\np w 1/s^2\np d1\np d2\np c rad"
+"""What a board that names nothing would say (pvid.link.names)."""

@@ -220,8 +220,8 @@ function drawWords(state) {
   say("modelled", state.modelled || "not simulated yet", state.modelled ? "" : "quiet");
   place("kappaShare").value = state.kappaShare;
   const large = state.parameters.filter((one) => one.large), small = state.parameters.filter((one) => !one.large);
-  filled(place("tiles"), "tile", large.map((one) => [["span", one.symbol], ["b", one.value], ["span", `${one.error} ${one.unit}`], ["br", ""], ["span", one.meaning]]));
-  filled(place("parameters"), "tr", small.map((one) => [["td", one.symbol], ["td", one.meaning, "quiet"], ["td", one.value], ["td", `${one.error} ${one.unit}`]]));
+  filled(place("tiles"), "tile", large.map((one) => [["span", one.name], ["b", one.value], ["span", `${one.error} ${one.unit}`]]));
+  filled(place("parameters"), "tr", small.map((one) => [["td", one.name], ["td", one.value], ["td", `${one.error} ${one.unit}`]]));
 }
 
 function redraw() {
