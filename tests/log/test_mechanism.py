@@ -93,8 +93,9 @@ def test_former_keys_and_wrong_values_of_constants() -> None:
     for document, value in (({"l1": 0.25}, 0.25), ({"model": {"name": "kapitza"}, "known": {"l1": 0.5}}, 0.5)):
         found = mechanism_in(document)
         assert found is not None and found.known == {"l1": value} and len(found.outputs) == 3
-    lacking = mechanism_in({"model": {"name": "kapitza"}, "known": {"l1": "long"}})
-    assert lacking is not None and not lacking.outputs
+    for wrong in ("long", 10**400, float("nan")):
+        lacking = mechanism_in({"model": {"name": "kapitza"}, "known": {"l1": wrong}})
+        assert lacking is not None and not lacking.outputs
     assert mechanism_in({"model": {"name": "motor.py"}}) is None and mechanism_in({}) is None
 
 

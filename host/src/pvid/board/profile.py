@@ -97,7 +97,7 @@ def profile(board: Board, form: Form, core: Core = "f32", model: str = STANDARD)
 
 
 def refined(board: Board) -> Profile:
-    """Of both stages of the pendulum, the ticks behind the first estimate of the second one.
+    """Of both stages of the standard mechanism, the ticks behind the first estimate of the second one.
 
     Raises
     ------

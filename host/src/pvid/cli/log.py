@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -195,7 +195,9 @@ def command(
 
 
 def _mechanism(model: CompiledModel) -> LogMechanism:
-    return mechanism_described(model.name, model, {one.name: one.value for one in model.knowns})
+    with suppress(PvidError):  # a parameter has the name of another column: the log is recorded without views of it
+        return mechanism_described(model.name, model, {one.name: one.value for one in model.knowns})
+    return UNNAMED
 
 
 def _view(title: str, mechanism: LogMechanism, address: str) -> Observer:

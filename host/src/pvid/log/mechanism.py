@@ -24,6 +24,7 @@ Errors = dict[str, tuple[float, float]]
 # Columns of a log's tables that no sample and no parameter may be called.
 TAKEN = frozenset(("t", "tick", "segment", "run", "log_time", "updates", "kappa", "residual", "reason"))
 _MOST_KEPT = 16
+_LARGEST = 1e30  # value of a constant
 
 
 def _none(p: Mapping[str, float], covariance: Float) -> Errors:
@@ -43,6 +44,11 @@ class LogMechanism:
         (p by name, its covariance in that order [n, n]) -> by name of the outputs their values and standard errors by
         the delta method; empty where p is not that of a possible mechanism
     known : values of its constants
+
+    Raises
+    ------
+    PvidError
+        Where a name is that of another column.
     """
 
     name: str
@@ -51,6 +57,12 @@ class LogMechanism:
     outputs: tuple[Quantity, ...] = ()
     outputs_at: Callable[[Mapping[str, float], Float], Errors] = _none
     known: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for columns in (self.samples, (*self.answers, *(Quantity(f"{one.name}_se", "") for one in self.answers))):
+            called = [one.name for one in columns]
+            if len(set(called)) < len(called) or not TAKEN.isdisjoint(called):
+                raise PvidError(f"{self.name}: a sample or a parameter has the name of another column")
 
     @property
     def answers(self) -> tuple[Quantity, ...]:
@@ -61,7 +73,7 @@ class LogMechanism:
 def mechanism_described(name: str, model: Description | CompiledModel, given: Mapping[str, Any]) -> LogMechanism:
     """The mechanism of a model with these values of its constants, among other keys."""
     values = {one.name: given.get(one.name, None if one.required else one.value) for one in model.knowns}
-    known = {key: float(value) for key, value in values.items() if isinstance(value, int | float)}
+    known = {k: float(x) for k, x in values.items() if isinstance(x, int | float) and abs(x) <= _LARGEST}
     samples, p, outputs = (
         tuple(Quantity(one.name, one.unit) for one in some) for some in (model.signals, model.unknowns, model.outputs)
     )
@@ -108,10 +120,6 @@ def mechanism_named(text: bytes) -> LogMechanism:
         Where the text breaks a rule of link.names, or a name is that of another column.
     """
     names = BoardNames.parse(text)
-    for columns in (names.samples, (*names.parameters, *((f"{name}_se", "") for name, _ in names.parameters))):
-        called = [name for name, _ in columns]
-        if len(set(called)) < len(called) or not TAKEN.isdisjoint(called):
-            raise PvidError(f"{names.mechanism}: a sample or a parameter has the name of another column")
     return LogMechanism(names.mechanism, names.samples, names.parameters)
 
 
