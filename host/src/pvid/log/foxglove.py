@@ -81,6 +81,8 @@ class FoxgloveServer:
         if isinstance(record.item, Loss):
             return  # of which a line in trouble has many
         for rows in self._values.rows(record):
+            if rows.table in ("events", "status") and self._values.follows and self._values.mechanism is UNNAMED:
+                continue  # the topics are those of the mechanism, which the board is about to name
             self._advertise()
             if rows.table == "estimates":
                 self._publish(rows)
