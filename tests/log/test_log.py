@@ -371,7 +371,7 @@ def test_log_records_all_and_ends_with_a_summary(tmp_path: Path, boards: Boards,
 def test_a_killed_logger_leaves_a_file_that_opens_and_is_appended_to(
     tmp_path: Path, boards: Boards, pvid: Loggers
 ) -> None:
-    boards(ticks=20 * TICKS)
+    boards(ticks=20 * TICKS, per_second=2 * TICKS)  # in 10 s: the first logger is killed long before
     process = pvid()
     wait_for(tmp_path / "out.pvlog", lambda account: account.samples > TICKS)
     process.kill()
