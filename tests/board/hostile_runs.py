@@ -101,7 +101,9 @@ def play_all() -> int:
         of_counts = replace(engine.config, estimator=replace(engine.config.estimator, **in_fixed))
         counting = weak_native_q31(engine.made, engine.parameters, of_counts).identifier()
         done += play_engine(counting, counting.run_samples, count_samples(phi, y, 2**12, 2**13))
-    recording = Recording(run["t"], {name: run[name] for name in ("y", "phi")}, simulation_of("kapitza").rig.sample_rate)
+    recording = Recording(
+        run["t"], {name: run[name] for name in ("y", "phi")}, simulation_of("kapitza").rig.sample_rate
+    )
     base = strong_design(compiled, recording)
     assert [one.name for one in base.strong.signals] == ["y", "phi"]
     for law, divider, exact_every, sigmas in STRONG:
