@@ -176,9 +176,9 @@ def test_identifiers_and_files_that_pages_name_exist() -> None:
         for name in re.findall(r"\b(?:pvid|PVID)_\w+\b(?!\*)", span):
             if name not in words and not name.endswith("_"):
                 missing.append(f"{page.relative_to(ROOT)}: {name}")
-        for name in re.findall(r"[\w/.]+\.(?:c|h|py|toml|cmake|md)\b", span):
+        for name in re.findall(r"[\w/.-]+\.(?:c|h|py|toml|cmake|md)\b", span):
             known = name.rsplit("/", 1)[-1] in files or re.match(
-                r"(run|rig|run-tuned|main|RUN|link|motor\w*|my_motor|own|cart|dc_motor\w*|kapitza_\w*|pvid_NAME|NAME_\w+)\b",
+                r"(run|rig|run-tuned|main|RUN|link|motor\w*|my_motor|own|cart|dc_motor\w*|kapitza_\w*|pvid_NAME|NAME_\w+|test_NAME)\b",
                 name,
             )
             if not known:

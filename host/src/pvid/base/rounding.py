@@ -38,7 +38,7 @@ def prefix_of(size: float, unit: str) -> tuple[str, float]:
     """The unit with the SI prefix for numbers up to `size`, where it takes one, and what a number in it is multiplied
     with: 0.0146, "m" is ("mm", 1e-3)."""
     power = 0
-    if unit in _PREFIXED and size > 0 and not _PLAIN[0] <= size < _PLAIN[1]:
+    if unit in _PREFIXED and 0 < size < math.inf and not _PLAIN[0] <= size < _PLAIN[1]:
         power = min(max(math.floor(math.log10(size) / 3), min(_PREFIXES)), max(_PREFIXES))
     return f"{_PREFIXES[power]}{unit}", 1000.0**power
 
