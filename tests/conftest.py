@@ -27,6 +27,10 @@ settings.load_profile("seeded")
 SLOW = (
     *("tools/pages", "board/targets", "tools/wheel", "identification/refined"),
     *("cli/design_cost", "cli/identify_in_c", "log/log", "deploy/deploy", "cli/cli"),
+    *("identification/work", "identification/refined_answer", "identification/refined_search"),
+    *("identification/mechanism_advice", "oracle/samples", "identification/refined_kinds", "identification/judge"),
+    *("identification/additions", "log/text_table", "oracle/feedback", "identification/following"),
+    *("cli/foreign_files", "cli/several", "codegen/strong_model_q31"),
     *("board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
     *("bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
     *("board/ports", "tools/notebooks", "cli/run_input", "identification/wild_samples", "identification/scale_errors"),
