@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.rig.columns import Channel, Columns
+from pvid.rig.columns import Channel, Columns, parsed
 from pvid.rig.run import Recording, read_recording, write_recording
 
 Float = npt.NDArray[np.float64]
@@ -41,7 +41,7 @@ class Run:
 
 def columns_of(text: str | None = None) -> Columns:
     """Of the text of --columns, or of their own names."""
-    return Columns(CHANNELS) if text is None else Columns.parse(text, CHANNELS)
+    return parsed(text, CHANNELS)
 
 
 def read_run(path: str | os.PathLike[str], rate: float | None = None, text: str | None = None) -> Run:

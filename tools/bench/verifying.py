@@ -60,12 +60,12 @@ def messages(board: Any, ticks: int) -> Iterator[tuple[int, link.Message]]:
         if len(piece) < EVERY:
             return
         done, own = first + EVERY, core.estimate()
-        values: dict[str, Any] = {"p": _padded(own["p"]), board.matrix: _triangle(own[board.matrix])}
+        values: dict[str, Any] = {"p": _padded(own["p"]), board.matrix: link.upper_triangle(own[board.matrix])}
         values |= {"se": _padded(own["se"])} if fixed else {}
         values |= {name: own[name].item() for name in ("kappa", "residual_sd", "weight")}
         yield done, estimate(session=configure.session, updates=core.updates, reason=core.verdict, **values)
         if (refined := core.refined()) is not None:
-            values = {"p": _padded(refined.best["p"]), "covariance": _triangle(refined.best["covariance"])}
+            values = {"p": _padded(refined.best["p"]), "covariance": link.upper_triangle(refined.best["covariance"])}
             values |= {name: _padded(refined.latest[name]) for name in ("r", "se")}
             values |= {name: refined.latest[name] for name in ("number", "level", "clash")}
             values |= {"reason": refined.told, "stage": refined.stage, "tick_high": 0}
@@ -75,10 +75,6 @@ def messages(board: Any, ticks: int) -> Iterator[tuple[int, link.Message]]:
 
 def _padded(row: Any) -> tuple[Any, ...]:
     return tuple(np.resize(np.append(row, np.zeros(MAX_P, np.asarray(row).dtype)), MAX_P).tolist())
-
-
-def _triangle(matrix: Any) -> tuple[Any, ...]:
-    return link.upper_triangle(np.pad(matrix, (0, MAX_P))[:MAX_P, :MAX_P])
 
 
 def write_log(board: Any, ticks: int, path: Path) -> None:

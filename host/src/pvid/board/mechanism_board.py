@@ -219,23 +219,25 @@ class MechanismBoard(FloatBoard):
         """The core, compiled on this machine, with the values of a Configure frame; raises as `configured`, and where
         there is no compiler."""
         config = self.configured(frame)
-        if self.refine is None:
-            return weak_native(self.compiled, self.config.design).identifier_of(config)
-        return weak_native(self.compiled, self.config.design, self.equations).refined_of(config, self.refine)
+        return self._weak(config) if self.refine is None else self._both_stages(config)
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the engine on this machine [ticks]."""
         samples = self.readings(*signals)
         if self.refine is None:
-            identifier = weak_native(self.compiled, self.config.design).identifier_of(self.config)
-            return identifier.run_samples(samples, sums=False).hash
+            return self._weak(self.config).run_samples(samples, sums=False).hash
         return self.both_stages().run_both(samples).hash
 
     def both_stages(self) -> RefinedIdentifier:
         """Both stages in C on this machine."""
+        return self._both_stages(self.config)
+
+    def _weak(self, config: WeakConfig) -> WeakIdentifier:
+        return weak_native(self.compiled, self.config.design).identifier_of(config)
+
+    def _both_stages(self, config: WeakConfig) -> RefinedIdentifier:
         assert self.refine is not None
-        library = weak_native(self.compiled, self.config.design, self.equations)
-        return library.refined_of(self.config, self.refine)
+        return weak_native(self.compiled, self.config.design, self.equations).refined_of(config, self.refine)
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""

@@ -133,7 +133,7 @@ def with_prediction(answer: Analysis) -> Analysis:
 
 
 def _with_superfluous(answer: Analysis, names: Sequence[str]) -> Analysis:
-    """The answer; what tells the bound of such a parameter says that the model without the term predicts as well."""
+    """The answer; the reason with the bound of a parameter adds that the model without its term predicts as well."""
     more = (
         f" Without {listed(names)}, motion that was not fitted is predicted as well: the equations need no such term."
     )

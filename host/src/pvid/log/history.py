@@ -240,13 +240,13 @@ class History:
         wanted = (one for one in aside if not isinstance(one, _Point) or one in kept)
         for one in _joined(wanted):
             record = one.record if isinstance(one, _Point) else one
-            mechanism = self.mechanism
+            mechanism = self._values.mechanism
             for rows in self._values.rows(record):
                 if rows.table == "samples":
                     self._take_samples(rows)
                 elif isinstance(one, _Point):
                     self._take_estimate(one, rows)
-            if self.mechanism is not mechanism:
+            if self._values.mechanism is not mechanism:
                 self._forget()
 
     def _forget(self) -> None:
