@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 from generated import WARNINGS
+from struct_fields import set_field
 
 from pvid.base.errors import PvidError
 from pvid.codegen import files_strong
@@ -294,14 +295,7 @@ def test_before_init_and_with_null_nothing_is_done() -> None:
 def test_init_names_the_field_that_it_refuses(field: str, value: float | None, status: Status) -> None:
     config = config_of("rigid_body", weights=FIVE)
     identifier = strong_native(strong_of("rigid_body"), config).identifier_of(config)
-    struct, (*parts, last) = identifier.config_struct, field.split(".")
-    for one in parts[:-1] if last.isdigit() else parts:
-        struct = getattr(struct, one)
-    given = identifier.native.headers.ffi.NULL if value is None else value
-    if last.isdigit():
-        getattr(struct, parts[-1])[int(last)] = given
-    else:
-        setattr(struct, last, given)
+    set_field(identifier.config_struct, field, identifier.native.headers.ffi.NULL if value is None else value)
     assert identifier.initialise() is status and not any(identifier.state_bytes)
 
 

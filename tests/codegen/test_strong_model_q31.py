@@ -6,12 +6,12 @@ import subprocess
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from generated import WARNINGS
+from struct_fields import set_field
 
 from pvid.base.errors import PvidError
 from pvid.codegen.files_strong_q31 import files_of
@@ -246,16 +246,6 @@ def test_before_init_and_with_null_nothing_is_done() -> None:
     assert init(identifier.state, identifier.config_pointer, layout + 1) == Status.BAD_LAYOUT
 
 
-def _set(struct: Any, path: str, value: Any) -> None:
-    *parts, last = path.split(".")
-    for one in parts:
-        struct = struct[int(one)] if one.isdigit() else getattr(struct, one)
-    if last.isdigit():
-        struct[int(last)] = value
-    else:
-        setattr(struct, last, value)
-
-
 @pytest.mark.parametrize(
     ("field", "value", "status"),
     [
@@ -280,7 +270,7 @@ def _set(struct: Any, path: str, value: Any) -> None:
 def test_init_names_the_field_that_it_refuses(field: str, value: int, status: Status) -> None:
     native = made("dc_motor")[1]
     identifier = native.started()
-    _set(identifier.config_struct, field, value)
+    set_field(identifier.config_struct, field, value)
     assert identifier.initialise() is status
     assert not any(identifier.state_bytes)
 
