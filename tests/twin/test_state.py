@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -65,3 +66,21 @@ def test_a_pointer_into_the_state_of_the_core_is_one_into_that_of_the_twin() -> 
         expected = board.core_of(frame).run_samples(board.recording[: tick + 40]).hash[tick:]
         np.testing.assert_array_equal(found.hash, expected)
     assert {(True, True), (False, True), (True, False)} <= set(pointed)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: MechanismBoard.of_guess(field_board.rig(), refined=True),
+        lambda: MechanismBoardQ31.of_guess(field_board.rig()),
+    ],
+    ids=["both stages", "weak q31"],
+)
+def test_every_public_function_of_an_identifier_is_printed(made: Callable[[], Any]) -> None:
+    """Also those that `step` does not reach: CONTRIBUTING.md promises that the twin needs no line for them."""
+    board = made()
+    frame = board.configure(1, 100, 100)
+    core, twin = board.core_of(frame), board.twin_of(frame)
+    names = {name for name in dir(core.native.library) if re.fullmatch(r"pvid_(weak|refine)_\w+", name)}
+    assert len(names) >= 6
+    assert names <= set(vars(twin.module))

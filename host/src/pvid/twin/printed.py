@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import is_
@@ -16,7 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.core.headers import Placed
 from pvid.core.model_library import NATIVE, ModelSources, core_of
 from pvid.core.refusals import refused
-from pvid.core.sources import FOLDERS
+from pvid.core.sources import FOLDERS, public_headers
 from pvid.settings.enums import Reason, Stage, Status
 from pvid.settings.record import Record
 from pvid.settings.refine import RefineConfig
@@ -30,16 +31,20 @@ Words = npt.NDArray[np.uint32]
 
 _PROGRESS_TICKS = 512
 _HASHING = Lock()  # a printed module is shared by all threads
-_VERBS = ("init", "step", "gap", "freeze", "estimate", "candidate")
-_REFINE = ("pvid_refiner_f32", "pvid_refine_best_f32", "pvid_refine_latest_f32", "pvid_refine_reason_f32")
+
+
+def _public(room: str, core: str) -> list[str]:
+    """The functions of an identifier that the public headers declare."""
+    text = "".join(one.read_text(encoding="utf-8") for one in public_headers())
+    return sorted(set(re.findall(rf"\bpvid_{room}_\w+_{core}(?=\()", text)))
 
 
 def printed(sources: ModelSources) -> ModuleType:
-    """The printed module of a mechanism's core: the functions of its identifier and what they need."""
+    """The printed module of a mechanism's core: the public functions of its identifier and what they need."""
     core, room = sources.engine.name, sources.engine.room
-    roots = [f"pvid_{room}_{verb}_{core}" for verb in _VERBS] + [f"pvid_fnv_estimator_{core}"]
+    roots = [*_public(room, core), f"pvid_fnv_estimator_{core}"]
     if sources.refined:
-        roots += [*_REFINE, "pvid_fnv_refine_f32"]
+        roots += [*_public("refine", "f32"), "pvid_refiner_f32", "pvid_fnv_refine_f32"]
     roots += [f"{sources.name}_{room}_{core}", f"{sources.name}_settings_{core}", f"{sources.name}_config_{core}"]
     macros = {name: str(value) for name, value in sources.sizes.items()}
     return printed_module(core_of(sources.engine, sources.refined), [*FOLDERS, NATIVE], macros, roots, sources.texts)
