@@ -423,7 +423,7 @@ def main() -> int:
     chosen = [proof for proof in PROOFS if proof.name in names]
     unknown = set(names) - {proof.name for proof in chosen}
     if unknown:
-        parser.error(f"no proof is called {', '.join(sorted(unknown))}")
+        parser.error(f"no entry of PROOFS (tools/prove.py) is called {', '.join(sorted(unknown))}")
     packages = {"frama-c": "frama-c-base", "why3": "why3", "z3": "z3"}
     missing = [package for tool, package in packages.items() if shutil.which(tool) is None]
     if missing:
