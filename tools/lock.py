@@ -1,37 +1,58 @@
 #!/usr/bin/env python3
 """Writes tools/requirements.txt anew from host/pyproject.toml: run it after a change there, and for newer versions.
 
-First what the others are built with where there is no wheel, then every package that tools/pvid installs, then what it
-adds for parquet, mcap and campaigns, then what tools/test adds: each with its version and the hashes of its files, for
-Linux on any processor and Python 3.11 and later. Needs uv (`pip install uv`).
+First uv, which installs the others, then what they are built with where there is no wheel, then every package that
+tools/pvid installs, then what it adds for parquet, mcap and campaigns, then what tools/test adds: each with its version
+and the hashes of its files, for Linux on any processor and Python 3.11 and later. Run it by the Python of build/venv.
 """
 
 from __future__ import annotations
 
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = ROOT / "host" / "pyproject.toml"
 LOCK = ROOT / "tools" / "requirements.txt"
 # Lines between which tools/bootstrap.sh takes what it installs at a time.
-USE, MORE, TESTS = "# to use pvid", "# for parquet, mcap and campaigns", "# for the tests alone"
+BUILD, USE, MORE, TESTS = (
+    "# to build with",
+    "# to use pvid",
+    "# for parquet, mcap and campaigns",
+    "# for the tests alone",
+)
 USED_EXTRAS = ["models", "page", "plot", "serial"]
 MORE_EXTRAS = ["cluster", "cycles", "excel", "foxglove", "hdf5", "mcap", "parquet", "ros"]
-BUILDERS = ("setuptools",)
+INSTALLER, BUILDERS = "uv", ("setuptools",)
 _WINDOWS = re.compile(r"os_name == 'nt'|sys_platform == 'win32'")
 HEADER = "# Written by tools/lock.py from host/pyproject.toml: do not edit.\n"
 
 
 def compiled(extras: list[str], *options: str) -> str:
     """What uv resolves for pvid with these extras and the backend that installs it."""
-    command = ["uv", "pip", "compile", "--quiet", "--universal", "--python-version", "3.11", "--no-header"]
+    command = [
+        sys.executable,
+        "-m",
+        "uv",
+        "pip",
+        "compile",
+        "--quiet",
+        "--universal",
+        "--python-version",
+        "3.11",
+        "--no-header",
+    ]
     command += ["--no-annotate", "--no-emit-index-url", "--no-emit-find-links"]
     command += ["--fork-strategy", "fewest", *options]
     command += [f"--extra={extra}" for extra in extras]
     return subprocess.run(
-        [*command, str(PROJECT), "-"], input="\n".join(BUILDERS), capture_output=True, text=True, check=True
+        [*command, str(PROJECT), "-"],
+        input="\n".join((INSTALLER, *BUILDERS)),
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
 
 
@@ -52,12 +73,13 @@ def main() -> None:
         )
     finally:
         fixed.unlink()
+    installer = [block for block in blocks if block.startswith(f"{INSTALLER}==")]
     builders = [block for block in blocks if block.startswith(tuple(f"{one}==" for one in BUILDERS))]
-    rest = [block for block in blocks if block not in builders]
+    rest = [block for block in blocks if block not in (*installer, *builders)]
     used = [block for block in rest if pinned(block) in first]
     more = [block for block in rest if pinned(block) in second - first]
     tests = [block for block in rest if pinned(block) not in second]
-    parts = [HEADER, *builders, f"{USE}\n", *used, f"{MORE}\n", *more, f"{TESTS}\n", *tests]
+    parts = [HEADER, *installer, f"{BUILD}\n", *builders, f"{USE}\n", *used, f"{MORE}\n", *more, f"{TESTS}\n", *tests]
     LOCK.write_text("".join(parts), encoding="utf-8")
     counts = (
         f"{len(builders)} + {len(used)} packages, {len(more)} for parquet, mcap and campaigns, {len(tests)} for tests"
