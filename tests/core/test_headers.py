@@ -29,7 +29,7 @@ def test_the_sizes_are_those_of_the_build(native: Native) -> None:
 
 
 def test_declarations_are_parsed_once_for_all_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(headers, "build_folder", lambda: tmp_path)
+    monkeypatch.setattr(headers, "cache_folder", lambda: tmp_path)
     text = "typedef struct { int16_t a; float b[3]; } pair; enum { THREE = 3 }; int f(pair *);"
     first = headers.Headers(text)
     monkeypatch.delattr(cffi, "FFI")
@@ -41,5 +41,5 @@ def test_declarations_are_parsed_once_for_all_processes(tmp_path: Path, monkeypa
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr(headers, "build_folder", lambda: tmp_path / "file")
+    monkeypatch.setattr(headers, "cache_folder", lambda: tmp_path / "file")
     assert headers.Headers("typedef struct { float a; } one;").dtype("one").itemsize == 4

@@ -35,7 +35,7 @@ def built_here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """The cache is an empty one, and the compiler is quick."""
     folder = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(model_library, "build_folder", lambda: folder)
+        patch.setattr(model_library, "cache_folder", lambda: folder)
         patch.setattr(model_library, "_FLAGS", [one for one in model_library._FLAGS if one != "-O2"])
         yield
 

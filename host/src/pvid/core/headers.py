@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.core.sources import IS_CLONE, PACKAGE, ROOT, build_folder
+from pvid.core.sources import IS_CLONE, PACKAGE, ROOT, cache_folder
 
 HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the build makes with them
 
@@ -219,7 +219,7 @@ def _compiled(text: str) -> str:
     """Python text that makes cffi's interface to declarations in milliseconds; parsing them takes a third of a second,
     once: the text stays in the cache of builds."""
     name = hashlib.sha256("\n".join((cffi.__version__, text)).encode()).hexdigest()[:24]
-    place = build_folder() / "cache" / "headers" / f"{name}.py"
+    place = cache_folder() / "headers" / f"{name}.py"
     with suppress(OSError):
         return place.read_text(encoding="utf-8")
     from cffi import recompiler  # with the parser of C

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from pvid.base.errors import PvidError
-from pvid.core.sources import build_folder
+from pvid.core.sources import cache_folder
 
 
 def host_compiler(what: str) -> str:
@@ -32,13 +32,20 @@ def host_compiler(what: str) -> str:
     raise PvidError(f"{what} needs a C compiler (cc, gcc or clang, or the one that CC names), and there is none")
 
 
+def build_of(compiler: str) -> str:
+    """What tells one build of a compiler from another, without starting it: its file, size and time."""
+    file = Path(compiler).resolve()
+    found = file.stat()
+    return f"{file} {found.st_size} {found.st_mtime_ns}"
+
+
 def compiled_once() -> Mapping[str, str]:
-    """The environment in which ccache, where it is installed, keeps the objects of all builds: in CCACHE_DIR, or in the
-    cache of builds.
+    """The environment in which ccache, where it is installed, keeps the objects of all builds: in CCACHE_DIR, or beside
+    what else is kept.
 
     Trees of one processor hold the same objects but for a macro or two.
     """
-    return {"CCACHE_DIR": str(build_folder() / "cache" / "ccache"), **os.environ, "CCACHE_NOHASHDIR": "true"}
+    return {"CCACHE_DIR": str(cache_folder() / "ccache"), **os.environ, "CCACHE_NOHASHDIR": "true"}
 
 
 def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], folder: Path) -> list[str]:

@@ -15,9 +15,9 @@ from pathlib import Path
 from filelock import FileLock
 
 from pvid.core.headers import HEADERS
-from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
+from pvid.core.host_compiler import build_of, host_compiler, objects_of, run_compiler
 from pvid.core.sizes import options_of
-from pvid.core.sources import FIRMWARE, INCLUDES, REFINE_MODEL, ROOT, SRC, build_folder, core_sources
+from pvid.core.sources import FIRMWARE, INCLUDES, REFINE_MODEL, ROOT, SRC, cache_folder, core_sources
 from pvid.settings.cores import FLOAT, CoreBuild
 
 NATIVE = ROOT / "host" / "native"
@@ -72,8 +72,8 @@ def model_library(
     """
     compiler = host_compiler(_WHAT)
     definitions = options_of(sizes)
-    key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
-    folder = build_folder() / "cache" / "models" / f"{name}-{engine.name}-{key.hexdigest()[:20]}"
+    key = hashlib.sha256("\0".join([build_of(compiler), *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
+    folder = cache_folder() / "models" / f"{name}-{engine.name}-{key.hexdigest()[:20]}"
     library = folder / f"lib{name}.so"
     if not library.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -161,7 +161,7 @@ def _core_objects(compiler: str, definitions: list[str], engine: CoreBuild, cach
     """Of the core without the second stage: those of one size are the same for every mechanism."""
     sources = core_of(engine, False)
     named = [str(one) for one in sources]
-    key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, *named, _core_hash()]).encode())
+    key = hashlib.sha256("\0".join([build_of(compiler), *_FLAGS, *definitions, *named, _core_hash()]).encode())
     place = cache_folder / f"core-{engine.name}-{key.hexdigest()[:20]}"
     with FileLock(place.with_name(f".{place.name}.lock")):
         if not place.exists():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pvid.base.user_cache import built_under
+from pvid.base.user_cache import built_under, user_cache
 
 PACKAGE = Path(__file__).resolve().parents[1]
 _IN_WHEEL = PACKAGE / "sources"
@@ -24,6 +24,11 @@ _FORMS = ("strong", "weak", "refine")  # rooms of a form's own
 def build_folder() -> Path:
     """Where something may be built: build/ of the clone, or the user's cache."""
     return built_under(ROOT / "build") if IS_CLONE else built_under(Path("/nonexistent"))
+
+
+def cache_folder() -> Path:
+    """What is kept under all that it was made from: the user's cache, which clones share, else that of builds."""
+    return (user_cache() or build_folder()) / "cache"
 
 
 def core_sources(pattern: str = "*.c") -> list[Path]:

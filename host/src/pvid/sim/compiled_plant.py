@@ -9,8 +9,8 @@ import tempfile
 from pathlib import Path
 
 from pvid.base.errors import PvidError
-from pvid.core.host_compiler import host_compiler
-from pvid.core.sources import build_folder
+from pvid.core.host_compiler import build_of, host_compiler
+from pvid.core.sources import cache_folder
 
 _FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-shared", "-fPIC", "-w")
 
@@ -24,8 +24,8 @@ def loaded(code: str) -> ctypes.CDLL:
         When there is no compiler, or it refuses the text.
     """
     compiler = host_compiler("a simulation")
-    name = hashlib.sha256("\n".join((compiler, *_FLAGS, code)).encode()).hexdigest()[:24]
-    place = build_folder() / "cache" / "plants" / f"{name}.so"
+    name = hashlib.sha256("\n".join((build_of(compiler), *_FLAGS, code)).encode()).hexdigest()[:24]
+    place = cache_folder() / "plants" / f"{name}.so"
     if not place.exists():
         place.parent.mkdir(parents=True, exist_ok=True)
         _build(compiler, code, place)

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 
 from pvid.base.atomic_write import write_whole
-from pvid.core.sources import build_folder
+from pvid.core.sources import cache_folder
 from pvid.twin.printer.directives import Reader
 from pvid.twin.printer.translate import Translator
 
@@ -74,7 +74,7 @@ def printed_module(
     key = hashlib.sha256(repr((sorted(macros.items()), list(roots), sorted((texts or {}).items()))).encode())
     for one in [*every, *printer]:
         key.update(one.name.encode() + b"\0" + one.read_bytes())
-    place = build_folder() / "cache" / "twins" / f"{key.hexdigest()[:24]}.py"
+    place = cache_folder() / "twins" / f"{key.hexdigest()[:24]}.py"
     text = ""
     with suppress(OSError):
         text = place.read_text(encoding="utf-8")
