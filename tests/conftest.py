@@ -72,6 +72,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and in `pvid bench long`")
     config.addinivalue_line("markers", "long: in `pvid bench long` alone")
     config.addinivalue_line("markers", "slow: left out of `./tools/test quick`")
+    config.addinivalue_line(
+        "markers", "night: what is handed out or measured, as its user has it; in `./tools/test night`"
+    )
 
 
 @pytest.fixture

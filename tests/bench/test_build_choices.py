@@ -12,6 +12,7 @@ def test_each_choice_has_a_title_of_its_own_core_and_stage() -> None:
     assert len(HEADER) == 5
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_a_build_for_little_flash_has_less_text_and_takes_more_instructions() -> None:
     printed = footprint_of(Choice("as printed"), 0)

@@ -18,6 +18,7 @@ def test_a_board_of_each_instruction_set_has_a_row_for_each_core() -> None:
     assert others == {"Cortex-M7F", "ATmega328P"}  # an M4F's instructions; too little memory for any mechanism
 
 
+@pytest.mark.night
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("board", "core", "names"),

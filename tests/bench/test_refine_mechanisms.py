@@ -166,6 +166,7 @@ def test_an_input_that_is_held_keeps_the_droop_of_its_own_steps_alone() -> None:
     assert abs(amplitude - (1 - theta**2 / 24)) < 2e-5  # fourth order: 1e-5; theta^2 / 12 is 2e-4
 
 
+@pytest.mark.night
 def test_each_mechanism_is_in_a_table_with_a_cell_for_each_column() -> None:
     made = cases()
     assert {name for name, *_ in made} == set(NAMES)

@@ -10,6 +10,7 @@ from bench.strong_mechanisms import FIXED_HEADER, HEADER, ON, comparison_of, fix
 from pvid.board.strong_image import play_on_board
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_a_row_has_the_cost_of_each_board_and_equal_bits() -> None:
     row = row_of("rigid_body")
@@ -18,6 +19,7 @@ def test_a_row_has_the_cost_of_each_board_and_equal_bits() -> None:
     assert means[0] * 5 < min(means[1:])  # soft float
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_without_a_floating_point_unit_a_tick_of_integers_is_cheaper() -> None:
     row = fixed_row_of("battery_2rc")

@@ -79,7 +79,9 @@ def test_a_run_goes_through_a_socket(start: Start, native: Native) -> None:
     assert_equal_through(url, native)
 
 
-@pytest.mark.parametrize("name", ["microbit", pytest.param("virt-rv32imac", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "name", [pytest.param("microbit", marks=pytest.mark.night), pytest.param("virt-rv32imac", marks=pytest.mark.night)]
+)
 def test_bytes_during_startup_do_not_block_the_receiver(name: str, native: Native) -> None:
     """A byte in the UART before its interrupt was on: some UARTs then never call again."""
     for _ in range(3):

@@ -150,7 +150,7 @@ def test_what_cannot_be_measured_is_refused(arguments: tuple[str, ...], sentence
 @pytest.mark.parametrize(
     ("mechanism", "what"),
     [
-        ("kapitza", "stack exceeds"),  # no guard below: the emulator stops it
+        pytest.param("kapitza", "stack exceeds", marks=pytest.mark.night),  # no guard below: the emulator stops it
         pytest.param("battery_2rc", "stack exceeds", marks=pytest.mark.long),  # and this one computes other bits
         ("furuta", "variables exceed"),
     ],

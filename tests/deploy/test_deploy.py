@@ -178,6 +178,7 @@ def test_two_files_have_the_bits_of_the_core_under_gnu17(motor: Deployment, tmp_
     assert "vfma" not in run("arm-none-eabi-objdump", "-d", tmp_path / "pvid_dc_motor.o")
 
 
+@pytest.mark.night
 def test_esp_idf(motor: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("IDF_PATH", str(STUBS / "esp_idf"))
     folder = written(motor, "esp-idf", tmp_path / "p")
@@ -191,6 +192,7 @@ def test_esp_idf(motor: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert (example / path["override_path"]).resolve() == folder.resolve()
 
 
+@pytest.mark.night
 def test_zephyr(motor: Deployment, tmp_path: Path) -> None:
     folder = written(motor, "zephyr", tmp_path / "p")
     tree = built(folder / "samples" / "dc_motor", tmp_path / "b", f"-DZephyr_DIR={STUBS / 'zephyr'}")
@@ -202,6 +204,7 @@ def test_zephyr(motor: Deployment, tmp_path: Path) -> None:
     assert re.search(pattern, expected(motor)[0])
 
 
+@pytest.mark.night
 def test_cubemx_on_an_emulated_stm32_with_newlib_nano(motor: Deployment, tmp_path: Path) -> None:
     folder = written(motor, "cubemx", tmp_path / "p")
     headers, libraries = newlib("thumb/v7e-m+fp/hard")
@@ -222,6 +225,7 @@ def test_cubemx_on_an_emulated_stm32_with_newlib_nano(motor: Deployment, tmp_pat
     assert len(lines) > len(motor.parameters)  # estimates before the last one
 
 
+@pytest.mark.night
 @pytest.mark.parametrize("target", ["platformio", "arduino"])
 def test_platformio_packs_it(target: str, motor: Deployment, tmp_path: Path) -> None:
     """With PlatformIO's own command, for which the list of licences, which it downloads, has one entry here."""
@@ -246,6 +250,7 @@ def test_platformio_packs_it(target: str, motor: Deployment, tmp_path: Path) -> 
     assert {manifest, "src/dc_motor_identifier.h", "examples/dc_motor/dc_motor.ino"} <= names
 
 
+@pytest.mark.night
 def test_esp_idf_packs_it(motor: Deployment, tmp_path: Path) -> None:
     folder = written(motor, "esp-idf", tmp_path / "p")
     run(*packer("idf_component_manager"), "component", "pack", "--name", "pvid_dc_motor", cwd=folder)

@@ -64,6 +64,7 @@ def printed(board: str, image: Path, count: int) -> list[str]:
         process.communicate()
 
 
+@pytest.mark.night
 def test_a_mega_identifies_the_pendulum_in_fixed_point(pendulum: Deployment, tmp_path: Path) -> None:
     library = tmp_path / "pvid_kapitza"
     write_package(pendulum, "arduino", library)
@@ -72,6 +73,7 @@ def test_a_mega_identifies_the_pendulum_in_fixed_point(pendulum: Deployment, tmp
     assert printed("atmega2560", image, len(wanted)) == wanted
 
 
+@pytest.mark.night
 def test_an_uno_runs_the_estimator_on_rows_of_ones_own(tmp_path: Path) -> None:
     sketch, library = tmp_path / "uno", tmp_path / "libraries" / "pvid"
     source = library / "src"
@@ -110,6 +112,7 @@ def test_the_least_mechanism_is_too_large_for_an_uno_and_a_poor_recording_is_nam
     assert size is not None and 2048 < int(size[1]) < 8192
 
 
+@pytest.mark.night
 def test_the_sketch_that_records_sends_a_run(tmp_path: Path) -> None:
     """On an emulated Uno, whose inputs are open: the clock, the drive and the format of its lines."""
     sketch = tmp_path / "record"

@@ -301,7 +301,11 @@ def finished(sent: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 @pytest.mark.parametrize(
-    ("scheme", "width", "height"), [("dark", 390, 844), ("light", 1280, 800), ("dark", 1920, 1080)]
+    ("scheme", "width", "height"),
+    [
+        ("dark", 390, 844),
+        *(pytest.param(*one, marks=pytest.mark.night) for one in (("light", 1280, 800), ("dark", 1920, 1080))),
+    ],
 )
 def test_a_finished_log_fits_every_screen_and_scheme(
     tmp_path: Path, finished: Path, width: int, height: int, scheme: str

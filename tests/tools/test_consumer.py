@@ -102,6 +102,7 @@ def test_find_package_refuses_another_version(prefix: Path, tmp_path: Path) -> N
     assert "0.9" in done.stderr
 
 
+@pytest.mark.night
 def test_fetch_content(by_package: list[str], tmp_path: Path) -> None:
     archive = tmp_path / "pvid.tar.gz"
     with tarfile.open(archive, "w:gz") as file:
@@ -115,6 +116,7 @@ def test_fetch_content(by_package: list[str], tmp_path: Path) -> None:
     assert printed == by_package
 
 
+@pytest.mark.night
 def test_add_subdirectory(by_package: list[str], tmp_path: Path) -> None:
     for name in SOURCES:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
@@ -165,6 +167,7 @@ def test_init_refuses_sizes_that_disagree(prefix: Path, tmp_path: Path) -> None:
     assert "library: window=321 " in done.stderr and " harmonics=17 " in done.stderr and " harmonics=13 " in done.stderr
 
 
+@pytest.mark.night
 def test_a_header_of_sizes_travels_too(tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir()

@@ -44,7 +44,10 @@ def without(folder: Path, modules: list[str]) -> None:
         (folder / name / "__init__.py").write_text(text, encoding="utf-8")
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(one, id=one.stem, marks=() if one.stem == "motor" else pytest.mark.night) for one in NOTEBOOKS],
+)
 def test_every_cell_runs_and_shows_what_the_file_shows(
     path: Path, runner: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -35,6 +36,8 @@ SURROUNDINGS = {
     "firmware.md": SETTINGS + "float read_encoder(void);\nfloat read_pivot(void);\n"
     "void show(const pvid_estimate_f32 *);\n",
 }
+# Pages whose blocks every run of the tests executes; those of the others `./tools/test night`.
+SMOKE = ("README.md", "CONTRIBUTING.md")
 # Printed once whatever the page; they write nothing that a later command reads.
 PURE = {"identify", "tune", "design", "plot", "compare", "models"}
 
@@ -92,7 +95,10 @@ def compile_c(block: pages.Block, folder: Path) -> None:
     assert done.returncode == 0, f"{block}: {done.stderr}"
 
 
-@pytest.mark.parametrize("page", pages.pages(), ids=str)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(one, id=str(one), marks=() if one.name in SMOKE else pytest.mark.night) for one in pages.pages()],
+)
 def test_every_block_of_a_page_is_executed(
     page: Path, files: Path, known: dict[tuple[str, ...], pages.Printed], tmp_path: Path
 ) -> None:
@@ -126,6 +132,17 @@ def test_every_block_of_a_page_is_executed(
             case "output":
                 missing = list(pages.differences(block.text, printed))
                 assert missing == [], f"{block}: tools/pages.py --update {page}\nprinted:\n{printed}"
+
+
+def test_every_command_of_a_page_is_one() -> None:
+    """Its words and options; what it does and prints is for `./tools/test night`."""
+    for page in pages.pages():
+        for block in pages.blocks_of(page):
+            assert block.kind != "unknown", str(block)
+            for line in pages.commands_of(block) if block.kind == "commands" else ():
+                if line.startswith("./tools/pvid") and not re.search(r"FOLDER|\w\|\w", line):  # a choice of words
+                    with suppress(click.exceptions.Exit):  # --help, --version
+                        pages.parse(line)
 
 
 def test_a_reason_and_a_short_form_are_each_used() -> None:

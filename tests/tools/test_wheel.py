@@ -116,6 +116,7 @@ def test_the_installed_package_compares_its_own_core_with_the_twin(bare: Path, t
     assert "equal" in run(bare, commands("simulate run.csv --duration 8", "compare run.csv"), tmp_path)
 
 
+@pytest.mark.night
 def test_a_mechanism_is_compiled_with_the_sources_in_the_wheel(
     bare: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -126,6 +127,7 @@ def test_a_mechanism_is_compiled_with_the_sources_in_the_wheel(
     assert list((tmp_path / "cache" / "pvid").glob("cache/models/dc_motor*")) or (tmp_path / "cache").exists()
 
 
+@pytest.mark.night
 def test_without_termios_every_command_but_the_link_works(bare: Path, tmp_path: Path) -> None:
     """As on Windows."""
     block = "import sys; sys.modules['termios'] = None; sys.modules['fcntl'] = sys.modules['resource'] = None\n"
@@ -144,6 +146,7 @@ def test_a_missing_extra_is_named(bare: Path, tmp_path: Path) -> None:
 FOUND = interpreters()
 
 
+@pytest.mark.night
 @pytest.mark.parametrize(
     "python",  # the oldest and the newest; those between them in the long form
     [
