@@ -119,7 +119,9 @@ class TestFunctions:
     def overlap(self, first: int, second: int) -> Float:
         """The same over the half that two neighbours share: chi^(first) of the earlier, chi^(second) of the later."""
         if (first, second) not in self._overlaps:
-            self._overlaps[first, second] = np.real(self._rated(first).T @ self._shared @ self._rated(second))
+            if first not in self._earlier:
+                self._earlier[first] = self.combine(first).T @ self._shared
+            self._overlaps[first, second] = self._earlier[first] @ self.combine(second)
         return self._overlaps[first, second]
 
     @cached_property
@@ -127,14 +129,34 @@ class TestFunctions:
         return {}
 
     @cached_property
-    def _shared(self) -> Complex:
-        """Sum over j < hop of e^(pi i (h (j + hop) + g j)/hop), h and g = -H..H."""
-        h = np.arange(-self.highest, self.highest + 1)
-        both = h[:, np.newaxis] + h
-        out = np.where(both % (2 * self.hop) == 0, self.hop, 0).astype(np.complex128)
-        odd = both % 2 != 0
-        out[odd] = 2 / (1 - np.exp(1j * math.pi / self.hop * both[odd]))
-        return out * ((-1.0) ** h)[:, np.newaxis]
+    def _earlier(self) -> dict[int, Float]:
+        return {}
+
+    @cached_property
+    def _shared(self) -> Float:
+        """Sum over j < hop of b_h(j + hop) b_g(j) [2 H + 1, 2 H + 1]: b = (1, cos x, sin x, cos 2 x, ...), x = pi j/hop.
+
+        From E(s) = sum e^(pi i s j/hop) at s = h + g and h - g: hop at 0, 0 at other even s, 2/(1 - e^(pi i s/hop))
+        at odd ones.
+        """
+        top = self.highest
+        s = np.arange(2 * top + 1)
+        sums = np.zeros(2 * top + 1, np.complex128)
+        sums[s % (2 * self.hop) == 0] = self.hop
+        sums[1::2] = 2 / (1 - np.exp(1j * math.pi / self.hop * s[1::2]))
+        h = np.arange(top + 1)
+        plus, apart = sums[h[:, np.newaxis] + h], sums[np.abs(h[:, np.newaxis] - h)]
+        apart = np.where(h[:, np.newaxis] < h, np.conj(apart), apart)
+        out = np.empty((2 * top + 1, 2 * top + 1))
+        out[0, 0] = self.hop
+        cosine, sine = slice(1, None, 2), slice(2, None, 2)
+        out[0, cosine], out[cosine, 0] = plus[0, 1:].real, plus[1:, 0].real
+        out[0, sine], out[sine, 0] = plus[0, 1:].imag, plus[1:, 0].imag
+        plus, apart = plus[1:, 1:], apart[1:, 1:]
+        out[cosine, cosine], out[sine, sine] = (plus + apart).real / 2, (apart - plus).real / 2
+        out[sine, cosine], out[cosine, sine] = (plus + apart).imag / 2, (plus - apart).imag / 2
+        signs = np.repeat((-1.0) ** h, 2)[1:]  # of e^(pi i h (j + hop)/hop)
+        return np.asarray(out * signs[:, np.newaxis])
 
     @cached_property
     def circle(self) -> Complex:
