@@ -134,7 +134,7 @@ class TestFunctions:
 
     @cached_property
     def _shared(self) -> Float:
-        """Sum over j < hop of b_h(j + hop) b_g(j) [2 H + 1, 2 H + 1]: b = (1, cos x, sin x, cos 2 x, ...), x = pi j/hop.
+        """Sum of b_h(j + hop) b_g(j) over j < hop [2 H + 1, 2 H + 1]: b = (1, cos x, sin x, cos 2 x, ..), x = pi j/hop.
 
         From E(s) = sum e^(pi i s j/hop) at s = h + g and h - g: hop at 0, 0 at other even s, 2/(1 - e^(pi i s/hop))
         at odd ones.
