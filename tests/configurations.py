@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 from block_models import BlockModel, EstimatorInC
-from weak_rig import engine_rig
+from weak_rig import weak_rig
 
 from pvid.codegen.weak_library import weak_native_q31
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.core.headers import Headers, Scalar, default_library
 from pvid.core.native import Native, Stepper
 from pvid.core.weak_native_q31 import WeakNativeQ31
@@ -155,7 +155,7 @@ RANGES = {
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 WITHOUT = {"weights": Status.BAD_BANK, "model": Status.BAD_MODEL}
 SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}  # what a form's init fills in
-# Of the engine: tests/core/test_weak_valid_q31.py, tests/unit/test_weak.c.
+# Of the identifier: tests/core/test_weak_valid_q31.py, tests/unit/test_weak.c.
 ELSEWHERE = {"design", "refine", "range", "drive_min", "offset"}
 UNUSED = {
     "weak": SET_BY_INIT | {"estimator.correlation", "estimator.row_weight", "compensation"} | ELSEWHERE,
@@ -264,8 +264,8 @@ def estimator_of_rows(native: Native) -> Stepper:
 
 @cache
 def _fixed() -> WeakNativeQ31:
-    engine = engine_for_simulated_rig(compiled_of("kapitza"))
-    return weak_native_q31(engine.made, engine.parameters, engine.config)
+    weak = weak_q31_for_simulated_rig(compiled_of("kapitza"))
+    return weak_native_q31(weak.made, weak.parameters, weak.config)
 
 
 def fixed_identifier() -> Stepper:
@@ -276,7 +276,7 @@ def fixed_identifier() -> Stepper:
 def subjects(native: Native) -> dict[str, Subject]:
     """The weak form in both cores, and an estimator by itself."""
     made: dict[str, Stepper] = {
-        "weak": engine_rig("kapitza").native.identifier_of(engine_rig("kapitza").config),
+        "weak": weak_rig("kapitza").native.identifier_of(weak_rig("kapitza").config),
         "weak q31": fixed_identifier(),
         "estimator": estimator_of_rows(native),
     }

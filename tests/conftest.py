@@ -48,7 +48,7 @@ SLOW = (
     *("core/sizes_agree", "board/mechanism_board", "codegen/generated_q31"),
     *("core/trust_q31",),
     *("board/port", "codegen/generated_f32", "cli/readme", "core/read_while_stepping", "log/export"),
-    *("codegen/strong_model", "log/untrusted", "board/field", "core/weak_engine_q31", "oracle/missing"),
+    *("codegen/strong_model", "log/untrusted", "board/field", "core/weak_rows_q31", "oracle/missing"),
     *("core/bad_config", "model/elimination", "oracle/weak_identify", "link/link"),
     *("core/dead_zone", "oracle/weak_choice", "codegen/weak_c"),
     *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/demo_run", "bench/model_boards"),
@@ -56,8 +56,8 @@ SLOW = (
     *("codegen/model_q31", "core/recorded_hashes", "twin/estimator_q31", "bench/mechanisms"),
     *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
     *("twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
-    *("tools/analysis", "board/engine_boards", "oracle/strong_described", "codegen/random"),
-    *("paper/paper", "tools/mutate", "oracle/weak_engine", "show/answer_figure"),
+    *("tools/analysis", "board/weak_boards", "oracle/strong_described", "codegen/random"),
+    *("paper/paper", "tools/mutate", "oracle/weak_in_c", "show/answer_figure"),
 )
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")

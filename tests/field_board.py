@@ -73,7 +73,7 @@ def rig(l1: float = 0.3) -> MechanismRig:
 
 @cache
 def board() -> MechanismBoard:
-    """The board for it, with the weak engine."""
+    """The board for it, with the weak identifier."""
     return MechanismBoard.of_guess(rig())
 
 

@@ -1,4 +1,4 @@
-"""The shipped mechanisms on their simulated rigs with the weak engine: tables, settings, samples, library, twin."""
+"""The shipped mechanisms on their simulated rigs with the weak identifier: tables, settings, samples, library, twin."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pvid.oracle.weak.rows import WeakRows
 from pvid.settings.parts import EstimatorConfig
 from pvid.settings.record import Record
 from pvid.settings.weak import WeakConfig
-from pvid.setup.weak import circle_of, config_of, design_tables, for_engine
+from pvid.setup.weak import circle_of, config_of, design_tables, for_core
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 from pvid.twin.printed import PrintedTwin
 
@@ -33,12 +33,12 @@ FUNCTIONS = 24  # where the rig's design does not give a number
 
 
 @dataclass(frozen=True)
-class EngineRig:
-    """A mechanism with its engine.
+class WeakRig:
+    """A mechanism with its identifier.
 
     Attributes
     ----------
-    config : settings of the float engine for the rig's own design, from the guesses of the description
+    config : settings of the float identifier for the rig's own design, from the guesses of the description
     samples : of a simulated run [ticks, samples]
     truth : p of the rig
     rows : of the float64 oracle, of the same run and design
@@ -58,13 +58,13 @@ class EngineRig:
 
 
 @cache
-def engine_rig(name: str, seed: int = 0, soft: bool = False) -> EngineRig:
+def weak_rig(name: str, seed: int = 0, soft: bool = False) -> WeakRig:
     """A shipped mechanism; soft: its friction, where it has one, has the soft sign in simulation and design."""
     compiled, rig, law = mechanisms.compiled_of(name), simulated_rig(name), SOFT if soft else PERFECT
     given: dict[str, Any] = {"functions": FUNCTIONS, **rig.design}
     if rig.friction_width and soft:
         given |= {"reversals": "soft", "soft": rig.friction_width}
-    design = for_engine(WeakDesign(rig.sample_rate, rig.window_s, **given))
+    design = for_core(WeakDesign(rig.sample_rate, rig.window_s, **given))
     simulation, made, model = simulation_of(name), ready(compiled), weak_model_of(compiled)
     run = simulation.run(seed, law)
     rows = WeakRows.of(made, run, design)
@@ -72,7 +72,7 @@ def engine_rig(name: str, seed: int = 0, soft: bool = False) -> EngineRig:
     samples = np.stack([np.asarray(run[one], np.float32) for one in model.sample_names], axis=1)
     config = config_of(tables, rig.sample_rate, made.parameters)
     largest = replace(tables, decimation=max(tables.decimation, 16))  # that `resized` may get
-    return EngineRig(config, samples, simulation.truth, rows, weak_native(compiled, largest))
+    return WeakRig(config, samples, simulation.truth, rows, weak_native(compiled, largest))
 
 
 def in_pieces(core: WeakIdentifier | PrintedTwin, samples: Float32, frozen: Mask) -> Record:

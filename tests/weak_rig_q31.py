@@ -1,4 +1,4 @@
-"""Fixed-point weak engines of the shipped mechanisms: formats, runs as counts, and their C as a library."""
+"""Fixed-point weak identifiers of the shipped mechanisms: formats, runs as counts, and their C as a library."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows, record_of
 from pvid.settings.weak import Source
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
-from pvid.setup.weak import design_tables, for_engine
+from pvid.setup.weak import design_tables, for_core
 from pvid.setup.weak_q31 import config_of_q31, row_formats
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
@@ -31,7 +31,7 @@ from pvid.sim.simulated_run import RigSimulation
 Float = npt.NDArray[np.float64]
 Int = npt.NDArray[np.int64]
 
-# Designs that the engine has; those of the rigs but for long windows, which would make the tests slow.
+# Designs that the identifier has; those of the rigs but for long windows, which would make the tests slow.
 DESIGNS = {
     "kapitza": WeakDesign(1000.0, 1.28, 9, 6, decimation=16, taps=61, rate_taps=101, rate_degree=6),
     "dc_motor": WeakDesign(1000.0, 0.4, 16, 6, rate_taps=21, rate_degree=3),
@@ -53,7 +53,7 @@ class Rig:
         run = simulation.run(seed, Imperfections())
         compiled = compiled_of(name)
         self.name, self.compiled = name, ready(compiled)
-        self.oracle_design = for_engine(DESIGNS[name])
+        self.oracle_design = for_core(DESIGNS[name])
         self.run = {key: np.asarray(x, np.float64)[:samples] for key, x in run.items()}
         self.made = weak_functions_of(compiled)
         known = {one.name: one for one in compiled.signals}
@@ -95,7 +95,7 @@ class Rig:
 
     @property
     def _first(self) -> int:
-        """Sample to whose instant the engine's first step refers."""
+        """Sample to whose instant the identifier's first step refers."""
         half, decimation = self.design.half, self.design.decimation
         if decimation > 1:
             return decimation * (1 + half)
@@ -105,7 +105,7 @@ class Rig:
     def oracle_sums(self) -> dict[int, Float]:
         """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
         functions = self.oracle_design.test_functions
-        # The oracle's first step is at the third sample or later; the engine's may be at the first one.
+        # The oracle's first step is at the third sample or later; the identifier's may be at the first one.
         missing = max(2 - self._first, 0)
         padded = {name: np.concatenate([x[:1]] * missing + [x]) for name, x in self.exact.items()}
         record = record_of(self.compiled, padded, self.oracle_design) if missing else self.record
@@ -278,7 +278,7 @@ _OPTIONS = (
 
 
 class Core:
-    """The C of the engine, compiled once; signed overflow ends the program."""
+    """The C of the identifier, compiled once; signed overflow ends the program."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

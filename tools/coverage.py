@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Branch coverage of the C core and the link by the quick tests: the CMocka programs, what tests/configurations.py asks
 of the shared library, and what compiles the core with the generated C of mechanisms: the tests of MECHANISMS and
-tests/playback_engine.py.
+tests/playback_weak.py.
 
     build/venv/bin/python tools/coverage.py
 
@@ -31,7 +31,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-import playback_engine  # noqa: E402 - of tests
+import playback_weak  # noqa: E402 - of tests
 
 from pvid.core import sources  # noqa: E402
 from pvid.settings.bounds import SIZES  # noqa: E402
@@ -50,11 +50,11 @@ NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
 PYTHONPATH = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
 PLAY = "import configurations; from pvid.core.native import Native; configurations.digest(Native())"
-PLAY_ENGINE = "import playback_engine; [list(one.digests(one.library)) for one in playback_engine.subjects()]"
-# The weak engine in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
+PLAY_WEAK = "import playback_weak; [list(one.digests(one.library)) for one in playback_weak.subjects()]"
+# The weak form in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
     *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_q31", "second_stage", "refinement")),
-    *(f"tests/core/test_{name}_q31.py" for name in ("weak_snapshot", "weak_engine", "trust")),
+    *(f"tests/core/test_{name}_q31.py" for name in ("weak_snapshot", "weak_rows", "trust")),
     *(f"tests/twin/test_{name}.py" for name in ("kinds", "kinds_q31", "estimator_q31")),
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "renewal", "snapshot_weak")),
     "tests/core/test_weak_valid_q31.py",
@@ -109,7 +109,7 @@ def build() -> list[Path]:
     """The core with counters, as the CMocka programs and the shared library have it; returns the programs."""
     shutil.rmtree(BUILD, ignore_errors=True)
     core = [*sources.core_sources(), FIRMWARE / "link" / "link.c"]
-    tests = playback_engine.unit_tests()
+    tests = playback_weak.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))
     jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, *COUNTED]) for path in core]
     jobs += [(BUILD / "native" / f"{path.stem}.o", path, [*NATIVE, *COUNTED]) for path in core]
@@ -153,7 +153,7 @@ def set_aside() -> Iterator[None]:
 
 
 def play_mechanisms() -> None:
-    """Runs the tests of mechanisms, and plays their engines, with a compiler that counts."""
+    """Runs the tests of mechanisms, and plays their identifiers, with a compiler that counts."""
     tools, counts = BUILD / "bin", BUILD / "counts"
     for folder in (tools, counts):
         folder.mkdir()
@@ -166,7 +166,7 @@ def play_mechanisms() -> None:
     given = {"PATH": path, "CC": str(tools / "gcc"), "CCACHE_DISABLE": "1"}
     with set_aside():
         run(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS, **given)
-        run(sys.executable, "-c", PLAY_ENGINE, PYTHONPATH=PYTHONPATH, **given)
+        run(sys.executable, "-c", PLAY_WEAK, PYTHONPATH=PYTHONPATH, **given)
 
 
 def counts_of(counters: Path) -> Iterator[tuple[str, int, list[int]]]:
@@ -229,7 +229,7 @@ def report_of(files: list[File]) -> str:
     return f"""# Branch coverage
 
 {taken} of the {branches} branches of `firmware/src` and `firmware/link` ({share(files):.1f} %)
-are taken by the CMocka programs, by what `tests/configurations.py` and `tests/playback_engine.py` play, and by
+are taken by the CMocka programs, by what `tests/configurations.py` and `tests/playback_weak.py` play, and by
 {len(MECHANISMS)} files of tests that compile the core with a mechanism, as gcov counts them at -O0: every operand of
 a `&&` or `||` has two. Other tests do not count. PVID_ASSERT, which ends the program,
 was compiled out. Missed:

@@ -6,7 +6,7 @@
     build/venv/bin/python tools/mutate.py --recorded       of all bits only the running hashes that the tests record
 
 The quick tests are two: what init answers to every edge of every setting (tests/configurations.py), and what
-tests/playback_engine.py plays of the weak engine and its second stage with the generated C of mechanisms, whose bits
+tests/playback_weak.py plays of the weak identifier and its second stage with the generated C of mechanisms, whose bits
 the suite compares with the numpy twin; and the
 CMocka programs of tests/unit, as they are, then those that take less than a second under clang's address and
 undefined-behaviour sanitizers. A crash and a loop without an end are noticed, too. A change that leaves the object code
@@ -41,7 +41,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import configurations  # noqa: E402 - of tests
-import playback_engine  # noqa: E402 - of tests
+import playback_weak  # noqa: E402 - of tests
 
 from pvid.core import sources  # noqa: E402
 from pvid.core.headers import HEADERS  # noqa: E402
@@ -57,7 +57,7 @@ INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}"]
 PRIVATE = sources.SRC.relative_to(FIRMWARE)
 LINK = FIRMWARE / "link" / "link.c"
 BESIDES = (*(ROOT / "host" / "native").glob("[lr]*.c"), LINK)  # of the shared library, beside the core
-ENGINE = re.compile(r"^(refine|weak)_|_(refine|weak)_")  # names of files of the weak form and of its second stage
+OF_WEAK = re.compile(r"^(refine|weak)_|_(refine|weak)_")  # names of files of the weak form and of its second stage
 COUNT = 240
 RECORDED = "--recorded" in sys.argv  # the workers of a pool read it, too
 LONGEST = 60  # seconds of processor time for what takes one
@@ -244,7 +244,7 @@ def playbacks() -> dict[Kit, Digests]:
     found: dict[Kit, Digests] = {}
     if not RECORDED:
         found[NATIVE] = lambda library: iter([("configurations", configurations.digest(Native(library)))])
-    for one in playback_engine.subjects():
+    for one in playback_weak.subjects():
         folder = one.library.parent
         options = ("-std=c99", *one.definitions, f"-I{folder}", f"-I{ROOT / 'host' / 'native'}")
         kit = Kit(one.name, "gcc", options, sources=(*one.sources, *sorted(folder.glob("*.c"))))
@@ -280,7 +280,7 @@ def tests_of(kit: Kit) -> dict[str, float]:
     folder = BUILD / kit.name
     kit.links(folder / "libpvidcore.so", made(kit))
     seconds = {}
-    for test in made(replace(kit, name=f"{kit.name}/tests", sources=tuple(playback_engine.unit_tests()))):
+    for test in made(replace(kit, name=f"{kit.name}/tests", sources=tuple(playback_weak.unit_tests()))):
         before = time.monotonic()
         if not kit.links_test(test.with_suffix(""), folder) or not passes(test.with_suffix(""), folder):
             raise SystemExit(f"{test.stem} fails with the core as it is ({kit.name})")
@@ -312,7 +312,7 @@ class Baseline:
         return sorted(self.seconds, key=lambda test: (stem not in test, self.seconds[test]))
 
 
-TESTS = replace(PLAIN, name="plain/tests", sources=tuple(playback_engine.unit_tests()))
+TESTS = replace(PLAIN, name="plain/tests", sources=tuple(playback_weak.unit_tests()))
 
 
 def headers_of(kit: Kit, source: Path) -> set[str]:
@@ -344,7 +344,7 @@ def baseline() -> Baseline:
         digests[kit] = digests_apart(kit, library, None)
         if not digests[kit] or digests[kit] != digests_apart(kit, library, None):
             raise SystemExit(f"the core as it is does not give the same bits twice ({kit.name})")
-    for one in playback_engine.subjects():
+    for one in playback_weak.subjects():
         own = next(shown for kit, shown in digests.items() if kit.name == one.name)
         if own != dict((one.hashes if RECORDED else one.digests)(one.library)):
             raise SystemExit(f"{one.name}: other bits than those of the library of pvid")
@@ -439,7 +439,7 @@ def changed_library(kit: Kit, mutant: Mutant, base: Baseline, folder: Path, name
 
 def killed_by_bits(mutant: Mutant, base: Baseline, folder: Path) -> str | None:
     """The first variant of a playback that is another; "no mutant" when no build's code is, or it does not compile."""
-    kits = sorted(playbacks(), key=lambda kit: (kit is NATIVE) == bool(ENGINE.search(mutant.file)))
+    kits = sorted(playbacks(), key=lambda kit: (kit is NATIVE) == bool(OF_WEAK.search(mutant.file)))
     differs = False
     for kit in (*kits, *([PLAIN] if RECORDED else [])):
         if not base.reached(kit, mutant.file):
@@ -648,7 +648,7 @@ def report_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
 file's number of them: one operator, sign or constant changed. {told.killed} were killed:
 {100 * told.killed / told.mutants:.1f} % of all, and {100 * told.rate:.1f} % of the {could} that are not
 equivalent. {told.by_bits} of them by the bits of a few seconds of data
-(`tests/configurations.py`, `tests/playback_engine.py`), the others by a CMocka program. The slower tests (every build
+(`tests/configurations.py`, `tests/playback_weak.py`), the others by a CMocka program. The slower tests (every build
 against the twin over 40 000 ticks, oracles, accuracy) were not asked.
 
 ## Survivors that a test could kill

@@ -47,7 +47,7 @@ INCLUDES = " ".join(
     )
 )
 PAGE = ROOT / "host" / "docs" / "proofs.md"
-GENERATED = ROOT / "build" / "proofs"  # of this run: the design of the weak engine
+GENERATED = ROOT / "build" / "proofs"  # of this run: the design of the weak identifier
 PREPROCESSOR = f"{INCLUDES} -I'{GENERATED}'"
 LONGEST = 3600  # seconds: many times what the slowest needs on a machine that is busy
 
@@ -236,7 +236,7 @@ PROOFS = (
     ),
     Proof(
         "weak_front_q31",
-        "the weak engine's front end, the pendulum's design: any counts within full scale, three times round the line",
+        "the weak form's front end, the pendulum's design: any counts within full scale, three times round the line",
         ("src/number/integer_q31.c",),
         ("-eva-min-loop-unroll", "60"),
         taken=("pvid_weak_count_q31",),
@@ -310,26 +310,26 @@ def unexplained(proof: Proof, said: str) -> list[str]:
     return fresh + [f"explained, but not found: {known}" for known in stale]
 
 
-def engine_design(folder: Path) -> None:
-    """Writes engine_design_q31.h: functions and tables of the pendulum's shipped rig, the reach of its jets."""
+def weak_design(folder: Path) -> None:
+    """Writes weak_design_q31.h: functions and tables of the pendulum's shipped rig, the reach of its jets."""
     from pvid.codegen import files_weak_q31
-    from pvid.configuration.weak_q31 import engine_for_simulated_rig
+    from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
     from pvid.models.mechanisms import compiled_of
 
-    engine = engine_for_simulated_rig(compiled_of("kapitza"))
-    name, made_by = engine.name, "tools/prove.py"
-    text = files_weak_q31.source(engine.made, engine.parameters, made_by)
+    weak = weak_q31_for_simulated_rig(compiled_of("kapitza"))
+    name, made_by = weak.name, "tools/prove.py"
+    text = files_weak_q31.source(weak.made, weak.parameters, made_by)
     reach = re.search(r"limits\[\d+\] = (\{[^}]*\})", text)
     assert reach is not None, "the generated function refuses no input"
     sizes = {"PVID_MAX_P": 3}  # those of the proofs are the defaults
     own = [
-        f"#define engine_design_q31 {name}_design_q31",
-        f"static const int32_t engine_reach[] = {reach[1]};",
+        f"#define weak_design_q31 {name}_design_q31",
+        f"static const int32_t weak_reach[] = {reach[1]};",
     ]
     files = {
-        f"{name}_weak_q31.h": files_weak_q31.header(engine.made, sizes, made_by),
-        f"{name}_design_q31.h": files_weak_q31.design_header(engine.config, name, sizes, made_by, []),
-        "engine_design_q31.h": "\n".join([text, f'#include "{name}_design_q31.h"', *own, ""]),
+        f"{name}_weak_q31.h": files_weak_q31.header(weak.made, sizes, made_by),
+        f"{name}_design_q31.h": files_weak_q31.design_header(weak.config, name, sizes, made_by, []),
+        "weak_design_q31.h": "\n".join([text, f'#include "{name}_design_q31.h"', *own, ""]),
     }
     for file, content in files.items():
         (folder / file).write_text(content, encoding="utf-8")
@@ -428,9 +428,9 @@ def main() -> int:
     missing = [package for tool, package in packages.items() if shutil.which(tool) is None]
     if missing:
         raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")
-    if any("engine_design_q31.h" in program_of(proof).read_text(encoding="utf-8") for proof in chosen):
+    if any("weak_design_q31.h" in program_of(proof).read_text(encoding="utf-8") for proof in chosen):
         GENERATED.mkdir(parents=True, exist_ok=True)
-        engine_design(GENERATED)
+        weak_design(GENERATED)
     with ThreadPoolExecutor(2) as pool:
         results = list(zip(chosen, pool.map(prove, chosen), strict=True))
     for proof, result in results:

@@ -22,7 +22,7 @@ from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.strong import strong_design
 from pvid.configuration.strong_q31 import fixed_design
 from pvid.configuration.weak import config_for_simulated_rig
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.core.native import Native, Stepper
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.run import Recording
@@ -76,7 +76,7 @@ def count_samples(phi: Samples, y: Samples, phi_max: int, y_max: int) -> Iterato
     yield np.zeros(TICKS, np.int64), np.zeros(TICKS, np.int64)
 
 
-def play_engine(identifier: Stepper, run: Callable[[Samples], object], parts: Iterator[tuple[Samples, Samples]]) -> int:
+def played(identifier: Stepper, run: Callable[[Samples], object], parts: Iterator[tuple[Samples, Samples]]) -> int:
     """One after the other through the same identifier, which takes y first; samples are missing after each."""
     done = 0
     for phi, y in parts:
@@ -92,15 +92,15 @@ def play_all() -> int:
     done = 0
     run = simulation_of("kapitza").run(1)
     compiled = compiled_of("kapitza")
-    config, engine = config_for_simulated_rig(compiled), engine_for_simulated_rig(compiled)
-    y, phi = engine.counts_of({name: run[name][:TICKS] for name in ("phi", "y")}).T
+    config, weak = config_for_simulated_rig(compiled), weak_q31_for_simulated_rig(compiled)
+    y, phi = weak.counts_of({name: run[name][:TICKS] for name in ("phi", "y")}).T
     for in_float, in_fixed in WEAK:
         own = replace(config, estimator=replace(config.estimator, **in_float), range=None)
         identifier = weak_native(compiled, config.design).identifier_of(own)
-        done += play_engine(identifier, identifier.run_samples, float_samples(run))
-        of_counts = replace(engine.config, estimator=replace(engine.config.estimator, **in_fixed))
-        counting = weak_native_q31(engine.made, engine.parameters, of_counts).identifier()
-        done += play_engine(counting, counting.run_samples, count_samples(phi, y, 2**12, 2**13))
+        done += played(identifier, identifier.run_samples, float_samples(run))
+        of_counts = replace(weak.config, estimator=replace(weak.config.estimator, **in_fixed))
+        counting = weak_native_q31(weak.made, weak.parameters, of_counts).identifier()
+        done += played(counting, counting.run_samples, count_samples(phi, y, 2**12, 2**13))
     recording = Recording(
         run["t"], {name: run[name] for name in ("y", "phi")}, simulation_of("kapitza").rig.sample_rate
     )
@@ -110,12 +110,12 @@ def play_all() -> int:
         estimator = replace(base.config.estimator, law=law, divider=divider, forgetting_s=3.0 if sigmas else 0.0)
         settings = replace(base.config, estimator=estimator, exact_every=exact_every, gate=GateConfig(sigmas, 1.0))
         strong = strong_native(base.strong, settings).identifier_of(settings)
-        done += play_engine(strong, strong.run_samples, float_samples(run))
+        done += played(strong, strong.run_samples, float_samples(run))
     fixed = fixed_design(compiled, recording, base)
-    y_max, phi_max = fixed.engine.config.full_scale
+    y_max, phi_max = fixed.strong_q31.config.full_scale
     y, phi = fixed.counts[:TICKS].T
-    in_counts = StrongNativeQ31(fixed.engine).started()
-    done += play_engine(in_counts, in_counts.run_samples, count_samples(phi, y, phi_max, y_max))
+    in_counts = StrongNativeQ31(fixed.strong_q31).started()
+    done += played(in_counts, in_counts.run_samples, count_samples(phi, y, phi_max, y_max))
     return done
 
 

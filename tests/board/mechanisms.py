@@ -49,12 +49,12 @@ def core_record(board: Board, readings: npt.NDArray[Any] | None = None) -> Recor
     """Of the C core on this machine: the board's recording, or other readings [ticks, samples]."""
     given = board.recording if readings is None else readings
     if isinstance(board, MechanismBoardQ31):
-        engine = board.engine
-        return weak_native_q31(engine.made, engine.parameters, engine.config).identifier().run_samples(given)
+        weak = board.weak
+        return weak_native_q31(weak.made, weak.parameters, weak.config).identifier().run_samples(given)
     return weak_native(board.compiled, board.config.design).identifier_of(board.config).run_samples(given)
 
 
 def samples_in_si(board: Board) -> npt.NDArray[np.float64]:
     """The recording in the units of the model [ticks, samples]."""
-    scale = np.array(board.engine.lsb) if isinstance(board, MechanismBoardQ31) else 1.0
+    scale = np.array(board.weak.lsb) if isinstance(board, MechanismBoardQ31) else 1.0
     return board.recording.astype(np.float64) * scale

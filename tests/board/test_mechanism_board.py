@@ -24,7 +24,7 @@ from pvid.link.frames import Code, Core, Estimate, EstimateQ31, Form, Raw, Sourc
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader
 from pvid.log.recorder import EmulatorSource, Logger
-from pvid.log.rig import engine_text_of_log, mechanism_of_log, recording_of_log
+from pvid.log.rig import mechanism_of_log, recording_of_log, settings_text_of_log
 from pvid.log.verify import Verdict, Verifier
 from pvid.models.mechanisms import names
 from pvid.show.log_figure import write_log_figure
@@ -70,7 +70,7 @@ def _record(board: Board, out: Path) -> None:
 
 
 def verifier_of(log: Path) -> Verifier:
-    text = engine_text_of_log(log)
+    text = settings_text_of_log(log)
     assert text is not None
     return Verifier(board_of(text, path_of(log.stem)))
 
@@ -156,7 +156,7 @@ def test_log_is_verified_and_exported_under_the_mechanisms_names(
     assert np.allclose(found, samples_in_si(board), rtol=1e-6, atol=1e-9)
     last = list(csv.DictReader(paths[1].open()))[-1]
     for one, published in zip(board.p_names, core_record(board).published[-1], strict=True):
-        scale = 1.0 if isinstance(board, MechanismBoard) else board.engine.values(np.ones(len(board.p_names)))
+        scale = 1.0 if isinstance(board, MechanismBoard) else board.weak.values(np.ones(len(board.p_names)))
         value = float(published) * np.broadcast_to(scale, len(board.p_names))[board.p_names.index(one)]
         assert float(last[one]) == pytest.approx(value, rel=1e-6) and float(last[f"{one}_se"]) > 0
 

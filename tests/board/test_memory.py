@@ -55,7 +55,7 @@ def library() -> Path:
 
 @pytest.fixture
 def compiler(tmp_path: Path) -> Path:
-    """The same for the engine, whose functions of a mechanism are generated."""
+    """The same for the identifier, whose functions of a mechanism are generated."""
     made = tmp_path / "clang-sanitized"
     made.write_text(
         f'#!/bin/sh\nunset LD_PRELOAD\nexec clang -shared-libasan -Wno-pass-failed {SANITIZERS} -g "$@" -O0\n',

@@ -27,7 +27,7 @@ from pvid.link.frames import RefinedEstimate, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader, LogStream, Record
 from pvid.log.recorder import EmulatorSource, Logger
-from pvid.log.rig import engine_text_of_log, mechanism_of_log
+from pvid.log.rig import mechanism_of_log, settings_text_of_log
 from pvid.log.status import StatusLine
 from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.models.mechanisms import compiled_of
@@ -75,7 +75,7 @@ def published(pendulum: MechanismBoard) -> int:
 
 def verified(log: Path, records: list[Record] | None = None) -> Stretch:
     """The only stretch of a log, or of what was made of it."""
-    text = engine_text_of_log(log)
+    text = settings_text_of_log(log)
     assert text is not None
     (stretch,) = Verifier(board_of(text)).stretches(LogReader(log) if records is None else records)
     return stretch

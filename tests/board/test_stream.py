@@ -83,7 +83,7 @@ def standard(form: str, core: str = "f32") -> Standard:
     rig = MechanismRig("kapitza", known=simulated_rig("kapitza").knowns)
     if core == "q31":
         fixed = fixed_run("kapitza", TICKS)
-        board = MechanismBoardQ31(rig, fixed.engine, fixed.counts).without_recording
+        board = MechanismBoardQ31(rig, fixed.weak, fixed.counts).without_recording
         return Standard(board, tuple(fixed.counts.T), mechanism_image_q31.native_hashes(fixed))
     made = mechanism_run("kapitza", TICKS)
     own = MechanismBoard(rig, made.compiled, made.config, made.samples).without_recording

@@ -14,7 +14,6 @@ from conftest import ROOT
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31, sizes
 from pvid.board.boards import BOARDS, Board, run
-from pvid.board.engine_image import engine_image
 from pvid.board.replay_image import (
     REPORT_EVERY,
     ReplayReport,
@@ -22,6 +21,7 @@ from pvid.board.replay_image import (
     play,
 )
 from pvid.board.strong_image import hashes_of, standard_run
+from pvid.board.weak_image import weak_image
 from pvid.codegen.strong_twin import StrongModelTwin
 
 FORMS_AND_CORES = [*sizes.ALL, (sizes.REFINED, "f32")]
@@ -166,7 +166,7 @@ def test_a_figure_over_its_budget_is_named(tmp_path: Path) -> None:
 
 def test_an_image_for_an_fpu_reports_the_fault_on_a_core_without_one() -> None:
     board = BOARDS["mps2-an386"]
-    outcome = run(board, engine_image(board, "kapitza", "f32").image, TIMEOUT_S, machine="mps2-an385")
+    outcome = run(board, weak_image(board, "kapitza", "f32").image, TIMEOUT_S, machine="mps2-an385")
     assert outcome.exit_code == 112
     with pytest.raises(PvidError, match="FPU instruction and no FPU, exception 0x00000003 pc 0x"):
         parse_report(outcome.text)

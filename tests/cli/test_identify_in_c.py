@@ -66,7 +66,7 @@ def test_the_core_identifies_a_recording_as_the_oracle_does(
         exact = oracle["parameters"][parameter]
         assert one["unit"] == exact["unit"] and one["se"] >= one["se_noise"] > 0
         assert abs(one["value"] - truth[parameter]) < 5 * one["se"], parameter
-        # The oracle locates each reversal of friction, and chooses its own window; the engine takes the mean of signs.
+        # The oracle locates each reversal of friction, and chooses its own window; the core takes the mean of signs.
         assert abs(one["value"] - exact["value"]) < 5 * max(one["se"], exact["se"]), parameter
 
 
@@ -334,7 +334,7 @@ def test_without_a_compiler_there_is_one_sentence(
         pvid("identify", recorded["rigid_body"], "--core", "f32")
 
 
-def test_the_pendulum_s_own_rig_file_goes_through_the_engine_and_the_refinement(tmp_path: Path) -> None:
+def test_the_pendulum_s_own_rig_file_goes_through_the_identifier_and_the_refinement(tmp_path: Path) -> None:
     """Columns, resolution, guess and gains come from the rig file."""
     run = tmp_path / "run.csv"
     assert pvid("simulate", run, "--duration", "15", "--seed", "2").return_value == DONE
@@ -379,7 +379,7 @@ def test_design_predicts_the_errors_of_a_rig_file_s_guess(name: str, tone: str |
         pvid("design", "--rig", rig, "--run", "x.csv", "--duration", "3")
 
 
-def test_design_and_tune_show_the_engine_s_design_for_a_recording(recorded: dict[str, Path]) -> None:
+def test_design_and_tune_show_the_identifier_s_design_for_a_recording(recorded: dict[str, Path]) -> None:
     run = recorded["rigid_body"]
     design = json.loads(pvid("design", "--model", "rigid_body", "--run", run, "--json").stdout)
     core = json.loads(pvid("identify", run, "--core", "f32", "--json").stdout)

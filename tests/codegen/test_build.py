@@ -26,7 +26,7 @@ from pvid.configuration.refine import refine_design, refine_settings
 from pvid.configuration.strong import strong_design
 from pvid.configuration.strong_q31 import fixed_design
 from pvid.configuration.weak import config_for_simulated_rig, samples_of, simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_rig_like_the_shipped
+from pvid.configuration.weak_q31 import weak_q31_for_rig_like_the_shipped
 from pvid.core.host_compiler import host_compiler
 from pvid.core.sizes import default_sizes, raised
 from pvid.core.sources import INCLUDES, source
@@ -151,13 +151,13 @@ def test_the_fixed_point_strong_form_is_an_option_of_the_folder(tmp_path: Path) 
     simulation = simulation_of("rigid_body")
     found = simulation.run(seed=1)
     recording = Recording(found.pop("t"), found, simulation.rig.sample_rate)
-    engine = fixed_design(simulation.model, recording, strong_design(simulation.model, recording)).engine
-    whole = generated_model(simulation.model, strong=True, strong_engine=engine)
+    fixed = fixed_design(simulation.model, recording, strong_design(simulation.model, recording)).strong_q31
+    whole = generated_model(simulation.model, strong=True, strong_q31=fixed)
     build(whole, tmp_path / "rigid_body")
     check(whole, tmp_path / "rigid_body")
     (tmp_path / "CMakeLists.txt").write_text(STRONG.format(root=ROOT), encoding="utf-8")
     command = ("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_STRONG_Q31=ON")
-    run(*command, *(f"-D{macro}={size}" for macro, size in engine.sizes.items()))
+    run(*command, *(f"-D{macro}={size}" for macro, size in fixed.sizes.items()))
     compiled = ("ninja", "-C", str(tmp_path / "b"), "rigid_body/CMakeFiles/rigid_body.dir/rigid_body_strong_q31.c.o")
     run(*compiled)
     run(*command, "-DPVID_MAX_THETA_Q31=14")
@@ -199,9 +199,9 @@ def test_both_arithmetics_of_mechanisms_are_in_one_c_file(names: tuple[str, ...]
     lines, begun = ["static pvid_weak_f32 one;", "static pvid_weak_q31 other;"], []
     for name in names:
         compiled = compiled_of(name)
-        engine, config = engine_for_rig_like_the_shipped(compiled), config_for_simulated_rig(compiled)
-        build(generated_model(compiled, design=config, fixed_engine=engine), tmp_path / name)
-        for needed in (sizes_of_design(config.design), fitted_of(engine)):
+        weak, config = weak_q31_for_rig_like_the_shipped(compiled), config_for_simulated_rig(compiled)
+        build(generated_model(compiled, design=config, weak_q31_for_run=weak), tmp_path / name)
+        for needed in (sizes_of_design(config.design), fitted_of(weak)):
             sizes |= {macro: max(size, sizes.get(macro, 0)) for macro, size in needed.items()}
         headers = sorted(one.name for one in (tmp_path / name).glob(f"{name}*.h"))
         assert {f"{name}_design_f32.h", f"{name}_design_q31.h"} < set(headers)

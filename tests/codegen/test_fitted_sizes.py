@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from own_mechanisms import OWN, own_recording
-from weak_rig import engine_rig
+from weak_rig import weak_rig
 from weak_rig_q31 import rig as rig_q31
 
 from pvid.base.errors import PvidError
@@ -58,7 +58,7 @@ def test_a_window_and_a_block_share_places_where_there_is_time() -> None:
 @pytest.mark.parametrize("name", ["kapitza", "cart_pendulum"])
 def test_stages_are_counted_as_the_core_counts_them(name: str) -> None:
     """Of one kind, and of two with nuisances; a design whose windows find no place is refused."""
-    rig, found = engine_rig(name), set()
+    rig, found = weak_rig(name), set()
     sources = replace(rig.native.sources, sizes={**rig.native.sources.sizes, "PVID_MAX_WINDOWS": 0})
     for functions, hop, decimation, iterations, margin in (
         (16, 24, 16, 2, 4.0),

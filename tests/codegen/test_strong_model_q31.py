@@ -48,7 +48,7 @@ def recording(name: str) -> Recording:
 def made(name: str, law: Law = Law.STATIONARY) -> tuple[StrongDesignQ31, StrongNativeQ31]:
     model, run = simulation_of(name).model, recording(name)
     design = fixed_design(model, run, strong_design(model, run, law))
-    return design, StrongNativeQ31(design.engine)
+    return design, StrongNativeQ31(design.strong_q31)
 
 
 def wild(counts: Int32, window: int, seed: int) -> Int32:
@@ -112,8 +112,8 @@ def difference(core: Record, twin: Record) -> str:
 )
 def test_c_has_the_bits_of_its_twin_whatever_the_sensors_do(name: str) -> None:
     design, native = made(name)
-    readings = wild(design.counts, design.engine.config.window, seed=3)
-    identifier, twin = native.started(), StrongTwinQ31(design.engine)
+    readings = wild(design.counts, design.strong_q31.config.window, seed=3)
+    identifier, twin = native.started(), StrongTwinQ31(design.strong_q31)
     cuts = np.linspace(0, len(readings), 5).astype(int)
     seen: set[int] = set()
     hashed = fnv.START
@@ -140,8 +140,8 @@ def test_c_has_the_bits_of_its_twin_whatever_the_sensors_do(name: str) -> None:
     }
     assert wanted <= seen
     lower, upper = (
-        design.engine.config.estimator.lower,
-        design.engine.config.estimator.upper,
+        design.strong_q31.config.estimator.lower,
+        design.strong_q31.config.estimator.upper,
     )
     assert np.all((core.p >= lower) & (core.p <= upper))
 
@@ -156,23 +156,23 @@ def test_the_estimate_is_that_of_all_rows_in_float64(name: str) -> None:
     rows = oracle.rows(run.signals, run.sample_rate, StrongSettings(fitted.taps, fitted.degree, 1))
     first = int(np.argmax(record.reason != Reason.WARMING_UP))
     last = int(np.nonzero(np.isin(record.reason, [Reason.UPDATED, Reason.MISFIT]))[0][-1])
-    begin = first + 1 - fitted.taps - (2 if any(design.engine.made.strong.held) else 0)
+    begin = first + 1 - fitted.taps - (2 if any(design.strong_q31.made.strong.held) else 0)
     part = slice(begin, begin + last + 1 - first)
     used = StrongRows([one[part] for one in rows.regressors], [one[part] for one in rows.known], rows.times[part])
     p, _ = all_rows(oracle.parameters, used, oracle.parameters.checked(None))
-    found = design.engine.values(record.p[-1])
+    found = design.strong_q31.values(record.p[-1])
     assert np.all(np.abs(found - p) < fitted.noise / 16)
     assert identifier.counters["rejected_saturated"] == 0
-    se = design.engine.values(identifier.assess()["se"][: len(p)])
+    se = design.strong_q31.values(identifier.assess()["se"][: len(p)])
     assert np.all((se > fitted.noise / 2) & (se < 50 * fitted.noise))  # correlation: half a window
 
 
 def test_the_papers_law_alone_is_gain_0_at_every_row() -> None:
     design, native = made("rigid_body", Law.PSEUDOVELOCITY)
-    own = design.engine.config.estimator
+    own = design.strong_q31.config.estimator
     assert (own.gain, own.divider) == (0, 1)
     record = native.started().run_samples(design.counts[:2000])
-    assert difference(record, StrongTwinQ31(design.engine).run(design.counts[:2000])) == ""
+    assert difference(record, StrongTwinQ31(design.strong_q31).run(design.counts[:2000])) == ""
     assert np.all(record.reason[record.reason != Reason.WARMING_UP] == Reason.UPDATED)
 
 
@@ -192,7 +192,7 @@ def test_integer_weights_keep_the_sums_within_their_word_and_the_bank(taps: int,
 def test_the_window_at_full_scale_ends_no_word() -> None:
     """Each sample has the sign of its weight, order by order: the largest sums there are."""
     design, native = made("dc_motor")
-    config = design.engine.config
+    config = design.strong_q31.config
     full = np.array(config.full_scale)
     parts = []
     for order in range(ORDERS):
@@ -201,12 +201,12 @@ def test_the_window_at_full_scale_ends_no_word() -> None:
         parts.append(np.where(signs == 0, 1, signs)[:, None] * full)
     readings = np.tile(np.concatenate(parts), (2, 1)).astype(np.int32)
     core = native.started().run_samples(readings)
-    assert difference(core, StrongTwinQ31(design.engine).run(readings)) == ""
+    assert difference(core, StrongTwinQ31(design.strong_q31).run(readings)) == ""
 
 
 def test_a_count_beyond_full_scale_is_refused_and_empties_the_window() -> None:
     design, native = made("dc_motor")
-    config, identifier = design.engine.config, native.started()
+    config, identifier = design.strong_q31.config, native.started()
     warming = int((identifier.run_samples(design.counts[:300]).reason == Reason.WARMING_UP).sum())
     assert 0 < warming < 200
     for reading, refused in ((1, True), (0, False), (MOST, True), (-MOST - 1, True)):
@@ -228,7 +228,7 @@ def test_a_count_beyond_full_scale_is_refused_and_empties_the_window() -> None:
 def test_before_init_and_with_null_nothing_is_done() -> None:
     native = made("dc_motor")[1]
     identifier = native.started()
-    ffi, library, name = native.headers.ffi, native.library, native.engine.name
+    ffi, library, name = native.headers.ffi, native.library, native.strong_q31.name
     identifier.config_struct.gate.sigmas = 1
     assert identifier.initialise() is Status.BAD_GATE_SIGMAS and not any(identifier.state_bytes)
     reading, estimate = ffi.new("int32_t[64]"), ffi.new("pvid_estimate_q31 *")
@@ -299,9 +299,9 @@ int main(void)
 @pytest.fixture
 def sources(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """A folder with the generated files of a mechanism and a program that steps it through its standard input."""
-    engine = made(request.param)[0].engine
-    program = PROGRAM.format(name=engine.name, upper=engine.name.upper())
-    for name, text in {**files_of(engine, "a test"), "program.c": program}.items():
+    strong_q31 = made(request.param)[0].strong_q31
+    program = PROGRAM.format(name=strong_q31.name, upper=strong_q31.name.upper())
+    for name, text in {**files_of(strong_q31, "a test"), "program.c": program}.items():
         (tmp_path / name).write_text(text)
     return tmp_path
 
@@ -309,10 +309,10 @@ def sources(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 @pytest.mark.parametrize("sources", ["dc_motor", "two_link_arm"], indirect=True)
 def test_the_generated_files_compile_without_a_warning_and_in_cpp(sources: Path) -> None:
     design = made(next(sources.glob("*_strong_q31.c")).name.removesuffix("_strong_q31.c"))[0]
-    sizes = options_of(raised(design.engine.sizes))
-    (sources / "main.cpp").write_text(f'#include "{design.engine.name}_q31.h"\n')
+    sizes = options_of(raised(design.strong_q31.sizes))
+    (sources / "main.cpp").write_text(f'#include "{design.strong_q31.name}_q31.h"\n')
     options = [*WARNINGS, *sizes, *INCLUDES, f"-I{sources}", "-fsyntax-only"]
-    code = sources / f"{design.engine.name}_q31.c"
+    code = sources / f"{design.strong_q31.name}_q31.c"
     subprocess.run(["gcc", "-std=c99", *options, str(code)], check=True)
     plain = [one for one in options if one not in ("-Wmissing-prototypes", "-Wstrict-prototypes")]
     subprocess.run(["g++", *plain, str(sources / "main.cpp")], check=True)
@@ -323,11 +323,11 @@ def test_the_generated_files_compile_without_a_warning_and_in_cpp(sources: Path)
 def test_no_operation_of_a_wild_run_is_undefined(sources: Path) -> None:
     design, native = made("dc_motor")
     options = ["-std=c99", "-O2", "-fsanitize=undefined,address", "-fno-sanitize-recover=all", *INCLUDES]
-    options += [f"-I{sources}", *options_of(raised(design.engine.sizes))]
+    options += [f"-I{sources}", *options_of(raised(design.strong_q31.sizes))]
     code = map(str, [*sources.glob("*.c"), *core_of(STRONG_FIXED, False)])
     subprocess.run(["gcc", *options, *code, "-o", str(sources / "program")], check=True)
     for seed in range(8):
-        readings = wild(design.counts, design.engine.config.window, seed)
+        readings = wild(design.counts, design.strong_q31.config.window, seed)
         done = subprocess.run([sources / "program"], input=readings.tobytes(), capture_output=True, check=False)
         identifier = native.started()
         identifier.run_samples(readings)
@@ -342,7 +342,7 @@ def test_counts_beyond_24_bits_are_refused_and_made_coarser_to_identify() -> Non
         fixed_design(fine, run, base)
     design = fixed_design(fine, run, base, between_counts=True)
     assert 2**23 <= np.abs(design.counts).max() <= 2**24
-    assert np.all(np.abs(design.counts) <= design.engine.config.full_scale)
+    assert np.all(np.abs(design.counts) <= design.strong_q31.config.full_scale)
 
 
 def test_an_integral_since_the_start_of_the_run_goes_on_over_a_gap() -> None:
@@ -350,16 +350,16 @@ def test_an_integral_since_the_start_of_the_run_goes_on_over_a_gap() -> None:
     design, native = made("battery_2rc")
     readings = design.counts[:600].copy()
     readings[200] = MOST
-    identifier, twin = native.started(), StrongTwinQ31(design.engine)
+    identifier, twin = native.started(), StrongTwinQ31(design.strong_q31)
     assert difference(identifier.run_samples(readings), twin.run(readings)) == ""
-    down = design.engine.config.integral_down[0]
-    rates = design.engine.made.integrands
+    down = design.strong_q31.config.integral_down[0]
+    rates = design.strong_q31.made.integrands
     assert rates is not None
-    unit = design.engine.config.sample_rate * 2.0 ** (1 + rates.result_bits[0])
-    place = [one.name for one in design.engine.made.strong.signals].index("i")
-    current = design.counts[:600, place] * design.engine.lsb[place]
+    unit = design.strong_q31.config.sample_rate * 2.0 ** (1 + rates.result_bits[0])
+    place = [one.name for one in design.strong_q31.made.strong.signals].index("i")
+    current = design.counts[:600, place] * design.strong_q31.lsb[place]
     current[200] = current[199]
-    expected = float(np.sum((current[1:] + current[:-1]) / 2) / design.engine.config.sample_rate)
+    expected = float(np.sum((current[1:] + current[:-1]) / 2) / design.strong_q31.config.sample_rate)
     assert down >= 0 and identifier.state.integral[0] / unit == pytest.approx(expected, rel=1e-6)
 
 

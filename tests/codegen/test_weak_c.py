@@ -74,7 +74,7 @@ def test_values_are_the_gains_of_the_oracle(name: str) -> None:
     signs = [arguments[str(mark)] for mark in record.channels.sign_marks.values()]
     given = np.stack([*(arguments[one] for one in form.model.jet_names), *runs, *signs], axis=1)
     out = native(name).values(given.astype(np.float32))
-    # The engine has the constant behind all others, and behind the oracle's what shifts integrals.
+    # The identifier has the constant behind all others, and behind the oracle's what shifts integrals.
     oracle = [(one, gains) for one, gains in zip(record.channels.channels, record.gains, strict=True) if one.gain != 1]
     for own, (channel, gains) in zip(form.model.channel, oracle, strict=False):
         assert own.fold == channel.fold

@@ -1,4 +1,4 @@
-"""The tables of the weak engine say what the float64 oracle computes: an emulation in float64 reads nothing else."""
+"""The tables of the weak core say what the float64 oracle computes: an emulation in float64 reads nothing else."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.reversals import averaged
 from pvid.settings.weak import NONE, Source
-from pvid.setup.weak import config_of, design_tables, for_engine
+from pvid.setup.weak import config_of, design_tables, for_core
 
 Complex = npt.NDArray[np.complex128]
 
@@ -26,7 +26,7 @@ ROUNDING = 2e-5
 
 
 class Emulation:
-    """The engine in float64, from its tables and the places of the oracle's steps."""
+    """The identifier in float64, from its tables and the places of the oracle's steps."""
 
     def __init__(self, form: WeakForm) -> None:
         self.form, self.design, self.model = form, form.config.design, form.model
@@ -202,20 +202,20 @@ def test_integrals_have_the_channels_that_shift_them() -> None:
     assert all(one.gain != NONE for one in model.channel[:-1])
 
 
-def test_the_nearest_design_of_the_engine() -> None:
-    design = for_engine(WeakDesign(1000.0, 0.501, 16, decimation=3, rate_taps=21, joint=True))
+def test_the_nearest_design_of_the_identifier() -> None:
+    design = for_core(WeakDesign(1000.0, 0.501, 16, decimation=3, rate_taps=21, joint=True))
     assert (design.hop, design.joint, design.reversals) == (80, False, "averaged")
     assert design.window_s == pytest.approx(0.48)
-    short = for_engine(WeakDesign(1000.0, 0.026, 16))  # 13 steps a half, 11 harmonics
+    short = for_core(WeakDesign(1000.0, 0.026, 16))  # 13 steps a half, 11 harmonics
     assert short.hop == 24
-    assert for_engine(WeakDesign(1000.0, 1.0, 16, reversals="soft", soft=0.1)).reversals == "soft"
+    assert for_core(WeakDesign(1000.0, 1.0, 16, reversals="soft", soft=0.1)).reversals == "soft"
 
 
-def test_a_design_that_the_engine_does_not_have_is_refused() -> None:
+def test_a_design_that_the_identifier_does_not_have_is_refused() -> None:
     form = weak_form("dc_motor")
     located = WeakDesign(1000.0, 0.5, 16)
     rows = type(form.rows).of(form.rows.compiled, form.run, located)
-    with pytest.raises(PvidError, match="dc_motor: this design is none of the engine's"):
+    with pytest.raises(PvidError, match="dc_motor: this design is none of the identifier's"):
         design_tables(form.model, rows, form.truth)
 
 
@@ -227,8 +227,8 @@ def _twice() -> Model:
     return model
 
 
-def test_a_model_that_the_engine_cannot_sum_is_refused_in_one_sentence() -> None:
+def test_a_model_that_the_identifier_cannot_sum_is_refused_in_one_sentence() -> None:
     compiled = _twice().compiled("twice")
-    with pytest.raises(PvidError, match="since the start of the run: the weak engine integrates once"):
+    with pytest.raises(PvidError, match="since the start of the run: the weak identifier integrates once"):
         weak_functions_of(compiled)
     assert "integrates once" in (GeneratedModel(compiled, "test").weak.refusal or "")

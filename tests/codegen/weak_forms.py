@@ -17,7 +17,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.settings.weak import WeakConfig, WeakModel
-from pvid.setup.weak import config_of, design_tables, for_engine
+from pvid.setup.weak import config_of, design_tables, for_core
 from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
 
@@ -31,7 +31,7 @@ class WeakForm:
     Attributes
     ----------
     run : samples of its simulated rig
-    rows : of the oracle, with the engine's design
+    rows : of the oracle, with the identifier's design
     config : the tables, and settings
     """
 
@@ -60,7 +60,7 @@ def weak_form(name: str) -> WeakForm:
     simulation = RigSimulation.of(compiled, rig)
     run = simulation.run()
     model = ready(compiled)
-    design = for_engine(WeakDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
+    design = for_core(WeakDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
     rows = WeakRows.of(model, run, design)
     tables = design_tables(weak_model_of(compiled), rows, simulation.truth)
     return WeakForm(

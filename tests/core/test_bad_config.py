@@ -16,7 +16,7 @@ from configurations import HEADERS, HUGE, IDENTIFIERS, RANGES, SMALLEST, Range, 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.core.headers import Scalar
 from pvid.core.native import Native, Publisher
 from pvid.models.mechanisms import compiled_of
@@ -48,9 +48,9 @@ def empty(native: Native) -> dict[str, Subject]:
 @pytest.fixture(scope="module")
 def samples() -> dict[str, Samples]:
     """phi and y of the shipped rig by core."""
-    engine, run = engine_for_simulated_rig(compiled_of("kapitza")), simulation_of("kapitza").run(1)
+    weak, run = weak_q31_for_simulated_rig(compiled_of("kapitza")), simulation_of("kapitza").run(1)
     run = {name: run[name][:TICKS] for name in ("phi", "y")}
-    y, phi = engine.counts_of(run).T
+    y, phi = weak.counts_of(run).T
     return {"f32": (run["phi"], run["y"]), "q31": (phi, y)}
 
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from weak_rig import engine_rig
+from weak_rig import weak_rig
 
 from pvid.codegen.weak_library import weak_native_q31
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.models.mechanisms import compiled_of
 
 Float = npt.NDArray[np.float64]
@@ -20,7 +20,7 @@ Played = tuple[Float, Float, dict[str, int]]
 
 def in_float(dead_zone: float) -> Played:
     """The end p of the pendulum's shipped rig in the weak form, its published standard errors, the counters."""
-    rig = engine_rig("kapitza")
+    rig = weak_rig("kapitza")
     estimator = replace(rig.config.estimator, dead_zone=dead_zone)
     core = rig.native.identifier_of(replace(rig.config, estimator=estimator))
     record = core.run_samples(rig.samples, hashes=False)
@@ -29,13 +29,13 @@ def in_float(dead_zone: float) -> Played:
 
 def in_fixed_point(dead_zone: float) -> Played:
     """The same in fixed point."""
-    engine, rig = engine_for_simulated_rig(compiled_of("kapitza")), engine_rig("kapitza")
-    estimator = replace(engine.config.estimator, dead_zone=round(dead_zone * 2**16))
-    config = replace(engine.config, estimator=estimator)
-    core = weak_native_q31(engine.made, engine.parameters, config).identifier()
-    samples = dict(zip(engine.sample_names, rig.samples.T, strict=True))
-    record = core.run_samples(engine.counts_of(samples), hashes=False)
-    return engine.values(record.p[-1]), engine.values(core.estimate["se"][:4]), core.counters
+    weak, rig = weak_q31_for_simulated_rig(compiled_of("kapitza")), weak_rig("kapitza")
+    estimator = replace(weak.config.estimator, dead_zone=round(dead_zone * 2**16))
+    config = replace(weak.config, estimator=estimator)
+    core = weak_native_q31(weak.made, weak.parameters, config).identifier()
+    samples = dict(zip(weak.sample_names, rig.samples.T, strict=True))
+    record = core.run_samples(weak.counts_of(samples), hashes=False)
+    return weak.values(record.p[-1]), weak.values(core.estimate["se"][:4]), core.counters
 
 
 @pytest.mark.parametrize("played", [in_float, in_fixed_point])

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bench.board_engine import Answer, BoardEngine, FixedBoard, Float, FloatBoard, Signals
-from bench.engine import rms
-from pvid.configuration.weak import config_for_simulated_rig, engine_config, simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from bench.board_weak import Answer, BoardWeak, FixedBoard, Float, FloatBoard, Signals
+from bench.weak import rms
+from pvid.configuration.weak import config_for_simulated_rig, simulated_run_of, weak_config
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.models.mechanisms import compiled_of
 from pvid.settings.enums import Core
 from pvid.sim.imperfections import Imperfections
@@ -27,7 +27,7 @@ def informed(name: str) -> tuple[list[Signals], list[Float], list[Answer]]:
     """Runs, starts, and the answers of float32 with a design that contains the disturbance."""
     compiled, imperfect, simulation = compiled_of(name), CASES[name], simulation_of(name)
     _, design, p = simulated_run_of(compiled)
-    config = engine_config(compiled, simulation.run(99, imperfect), design, p)
+    config = weak_config(compiled, simulation.run(99, imperfect), design, p)
     own = config_for_simulated_rig(compiled).design
     assert (config.design.error_variance > 30 * own.error_variance).any()
     starts = [simulation.truth * np.random.default_rng(seed).uniform(0.7, 1.4, len(p)) for seed in range(RUNS)]
@@ -46,8 +46,8 @@ def test_a_disturbance_of_one_equation_does_not_spoil_the_others(name: str, core
     """
     runs, starts, wanted = informed(name)
     compiled, truth = compiled_of(name), simulation_of(name).truth
-    board: BoardEngine = (
-        FixedBoard(engine_for_simulated_rig(compiled))
+    board: BoardWeak = (
+        FixedBoard(weak_q31_for_simulated_rig(compiled))
         if core == "q31"
         else FloatBoard(compiled, config_for_simulated_rig(compiled))
     )

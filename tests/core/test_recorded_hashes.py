@@ -1,4 +1,4 @@
-"""The engines end with the running hashes that they had when these were recorded: a change of bits is no accident.
+"""The identifiers end with the running hashes that they had when these were recorded: a change of bits is no accident.
 
     build/venv/bin/python tests/core/test_recorded_hashes.py    writes tests/recorded_hashes.toml anew
 
@@ -17,7 +17,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # where it is run as a program
 
-from playback_engine import BOTH_STAGES, IN_FIXED_POINT, BothStages, InFixedPoint, Subject
+from playback_weak import BOTH_STAGES, IN_FIXED_POINT, BothStages, InFixedPoint, Subject
 
 RECORDED = Path(__file__).resolve().parents[1] / "recorded_hashes.toml"
 NAMES = [*(f"{name}_f32" for name in BOTH_STAGES), *(f"{name}_q31" for name in IN_FIXED_POINT)]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.board_engine import BoardEngine, FixedBoard, FloatBoard
+from bench.board_weak import BoardWeak, FixedBoard, FloatBoard
 from bench.hard import CASES, board, simulation_for
 
 RIG = simulation_for("kapitza", CASES[0])
@@ -26,12 +26,12 @@ def in_float32(renewal: float) -> FloatBoard:
 def in_fixed_point(renewal: float) -> FixedBoard:
     made = board("kapitza", "q31", 1.0)
     assert isinstance(made, FixedBoard)
-    trust = replace(made.engine.config.trust, renewal=round(renewal * 2**16))
-    return replace(made, engine=replace(made.engine, config=replace(made.engine.config, trust=trust)))
+    trust = replace(made.weak.config.trust, renewal=round(renewal * 2**16))
+    return replace(made, weak=replace(made.weak, config=replace(made.weak.config, trust=trust)))
 
 
 @pytest.mark.parametrize("board_with", [in_float32, in_fixed_point])
-def test_rows_that_do_not_fit_where_p_went_are_forgotten(board_with: Callable[[float], BoardEngine]) -> None:
+def test_rows_that_do_not_fit_where_p_went_are_forgotten(board_with: Callable[[float], BoardWeak]) -> None:
     """30 s at 14 bits whose encoder is off by a twentieth of the angle in the first 3 s."""
     run = {name: x[: 1000 * SECONDS] for name, x in RIG.run(3).items()}
     phi = run["phi"].copy()

@@ -1,4 +1,4 @@
-"""Snapshots of the weak engine: bits from any tick on, and what differs in any field is refused with its own status.
+"""Snapshots of the weak form: bits from any tick on, and what differs in any field is refused with its own status.
 
 The fields are those of the headers: a new one that neither the snapshot nor the fingerprint has fails here. The
 fixed-point core: tests/twin/test_weak_snapshot_q31.py.
@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import ROOT
-from engine_snapshots import (
-    Engine,
+from weak_rig import WeakRig, weak_rig
+from weak_snapshots import (
+    Identifier,
     assert_continues_from_every_tick,
     assert_every_byte_is_kept,
     assert_every_change_is_refused,
     assert_every_function_is_hashed,
 )
-from weak_rig import EngineRig, engine_rig
 
 from pvid.core.weak_native import WeakIdentifier
 from pvid.settings.enums import Reason, SnapshotStatus
@@ -27,10 +27,10 @@ from pvid.settings.parts import TrustConfig
 from pvid.settings.weak import WeakConfig
 
 
-def engines(rig: EngineRig, config: WeakConfig) -> tuple[Engine, Engine, WeakIdentifier]:
+def identifiers(rig: WeakRig, config: WeakConfig) -> tuple[Identifier, Identifier, WeakIdentifier]:
     """Two identifiers of a configuration, and the owner of its memory."""
     owner = rig.native.identifier_of(config)
-    one, other = (Engine(rig.native.headers.ffi, rig.native.library, "f32", owner.config_pointer) for _ in range(2))
+    one, other = (Identifier(rig.native.headers.ffi, rig.native.library, "f32", owner.config_pointer) for _ in range(2))
     return one, other, owner
 
 
@@ -42,12 +42,12 @@ def test_a_restored_run_continues_from_every_tick_of_half_a_window(
     name: str, compensation: bool, forgetting: float
 ) -> None:
     """So from every stage of the sums and of a window."""
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     estimator = replace(rig.config.estimator, forgetting_s=forgetting)
     trust = TrustConfig(se_max=10.0, groups_min=1)
     config = replace(rig.config, estimator=estimator, compensation=compensation, trust=trust)
     half = config.design.hop * config.design.decimation
-    one, other, _ = engines(rig, config)
+    one, other, _ = identifiers(rig, config)
     reasons = one.run(rig.samples[: 4 * half + 3])
     assert Reason.UPDATED in reasons or Reason.HELD_UNCERTAIN in reasons
     assert_continues_from_every_tick(one, other, rig.samples[4 * half + 3 : 5 * half + 3])
@@ -55,8 +55,8 @@ def test_a_restored_run_continues_from_every_tick_of_half_a_window(
 
 def test_a_pointer_into_the_object_points_into_the_restored_one() -> None:
     """p goes back to the published estimate, to which the solve in progress then points."""
-    rig = engine_rig("cart_pendulum")
-    one, other, _ = engines(rig, replace(rig.config, trust=TrustConfig(revert_after=1)))
+    rig = weak_rig("cart_pendulum")
+    one, other, _ = identifiers(rig, replace(rig.config, trust=TrustConfig(revert_after=1)))
     still = np.zeros((8 * rig.config.design.hop * rig.config.design.decimation, rig.samples.shape[1]), np.float32)
     seen = 0
     for tick in still:
@@ -69,8 +69,8 @@ def test_a_pointer_into_the_object_points_into_the_restored_one() -> None:
 
 
 def test_every_byte_is_saved_and_restored_but_those_of_pointers() -> None:
-    rig = engine_rig("kapitza")
-    one, other, _ = engines(rig, rig.config)
+    rig = weak_rig("kapitza")
+    one, other, _ = identifiers(rig, rig.config)
     ffi, size = one.ffi, one.ffi.sizeof("void *")
     solve = [ffi.offsetof(one.type, "finish", "work", "solve", name) for name in ("fallback", "noise", "estimate")]
     for place in assert_every_byte_is_kept(one, other):
@@ -92,9 +92,9 @@ def test_the_layout_names_every_size_of_an_array(core: str) -> None:
 
 @pytest.mark.parametrize("name", ["dc_motor", "battery_2rc"])
 def test_every_field_and_table_entry_that_differs_is_refused_with_its_status(name: str) -> None:
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     limits = np.ones(rig.samples.shape[1], np.float32)
-    one, _, owner = engines(rig, replace(rig.config, range=1e6 * limits, drive_min=0 * limits))
+    one, _, owner = identifiers(rig, replace(rig.config, range=1e6 * limits, drive_min=0 * limits))
     assert_every_change_is_refused(one)
     image, config = one.save(), one.config
     for limit in ("range", "drive_min"):
@@ -106,8 +106,8 @@ def test_every_field_and_table_entry_that_differs_is_refused_with_its_status(nam
 
 
 def test_a_model_with_the_same_tables_and_another_function_is_another_model() -> None:
-    rig = engine_rig("dc_motor")
-    one, _, _owner = engines(rig, rig.config)
+    rig = weak_rig("dc_motor")
+    one, _, _owner = identifiers(rig, rig.config)
     assert_every_function_is_hashed(one, "void(*)(float *, float *)", None)
     image = one.save()
     nothing = one.ffi.callback("void(*)(float *, float *)", lambda p, theta: None)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.board_engine import PUBLISHED, FixedBoard, FloatBoard
+from bench.board_weak import PUBLISHED, FixedBoard, FloatBoard
 from bench.hard import Case, board, simulation_for
 from pvid.configuration.weak import config_for_simulated_rig
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.identify import ready
@@ -45,7 +45,7 @@ def test_the_scatter_of_the_windows_makes_standard_errors_honest(core: Core) -> 
     names = ready(compiled).model.p_names
     truth = np.array([of_rig.get(name, 0.0) for name in names])
     own = (
-        FixedBoard(engine_for_simulated_rig(compiled))
+        FixedBoard(weak_q31_for_simulated_rig(compiled))
         if core == "q31"
         else FloatBoard(compiled, config_for_simulated_rig(compiled))
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from weak_rig import assert_same
 
-from bench.board_engine import PUBLISHED, Answer, FixedBoard
+from bench.board_weak import PUBLISHED, Answer, FixedBoard
 from bench.hard import CASES, Case, board, simulation_for
 from bench.mechanisms import start_of
 from pvid.settings.enums import Core, Reason

@@ -1,4 +1,4 @@
-"""What init of the fixed-point weak engine refuses: every shift, count, index and factor of its tables."""
+"""What init of the fixed-point weak identifier refuses: every shift, count, index and factor of its tables."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from pvid.codegen.weak_library import weak_native_q31
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
 from pvid.settings.enums import Status
@@ -58,8 +58,8 @@ class Tables:
 
 @pytest.fixture(scope="module")
 def native() -> WeakNativeQ31:
-    engine = engine_for_simulated_rig(compiled_of("kapitza"))
-    return weak_native_q31(engine.made, engine.parameters, engine.config)
+    weak = weak_q31_for_simulated_rig(compiled_of("kapitza"))
+    return weak_native_q31(weak.made, weak.parameters, weak.config)
 
 
 def _set(owner: Callable[[Tables], Any], field: str | int, value: Any) -> Callable[[Tables], None]:

@@ -21,7 +21,7 @@ from pvid.board.boards import BOARDS
 from pvid.board.boards import run as run_on
 from pvid.configuration.refine import full_motion_of, refine_for_simulated_rig
 from pvid.configuration.weak import config_for_recording, config_for_simulated_rig, simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_recording, engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_simulated_rig
 from pvid.deploy.deployment import Deployment
 from pvid.deploy.example import expected
 from pvid.deploy.of_rig import deployment_f32, deployment_q31
@@ -41,7 +41,7 @@ def motor() -> Deployment:
 @pytest.fixture(scope="module")
 def fixed_motor() -> Deployment:
     compiled = compiled_of("dc_motor")
-    return deployment_q31(engine_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
+    return deployment_q31(weak_q31_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def deployments(motor: Deployment, fixed_motor: Deployment) -> dict[str, Deploym
         "dc_motor": motor,
         "dc_motor in integers": fixed_motor,
         "free_pendulum": deployment_f32(free, config_for_recording(free, swing), swing.signals, "a test"),
-        "heated_plate in integers": deployment_q31(engine_for_recording(plate, steps), steps.signals, "a test"),
+        "heated_plate in integers": deployment_q31(weak_q31_for_recording(plate, steps), steps.signals, "a test"),
     }
 
 

@@ -20,7 +20,7 @@ from test_examples import ESTIMATOR, PRINTED
 from pvid.base.subprocesses import start
 from pvid.board.boards import BOARDS, prepare_emulator
 from pvid.configuration.weak import simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.deploy import memory
 from pvid.deploy.arduino import package
 from pvid.deploy.deployment import Deployment
@@ -35,7 +35,7 @@ _SECONDS = 120  # of the emulator
 @pytest.fixture(scope="module")
 def pendulum() -> Deployment:
     compiled = compiled_of("kapitza")
-    return deployment_q31(engine_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
+    return deployment_q31(weak_q31_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
 
 
 def uploaded(sketch: Path, board: str, libraries: Path, library: str, *more: str) -> Path:

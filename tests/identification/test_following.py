@@ -1,4 +1,4 @@
-"""What a rig file says of forgetting and of the gate reaches the weak engine, in both cores, and the refinement."""
+"""What a rig file says of forgetting and of the gate reaches the weak identifier, in both cores, and the refinement."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pvid.cli.main import commands
 from pvid.codegen.refine import refine_functions
 from pvid.configuration.refine import refine_settings
 from pvid.configuration.weak import config_for_simulated_rig, simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.model.compiled import Following
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
@@ -24,9 +24,9 @@ GIVEN = {"forgetting_s": 20.0, "outlier_gate": 5.0, "outlier_patience_s": 8.0, "
 
 
 def settings_of(following: Following) -> tuple[dict[str, float], dict[str, float]]:
-    """Of the engine for the motor in float32, and in fixed point in the same units."""
+    """Of the identifier for the motor in float32, and in fixed point in the same units."""
     compiled = replace(compiled_of("dc_motor"), following=following)
-    config, fixed = config_for_simulated_rig(compiled), engine_for_simulated_rig(compiled)
+    config, fixed = config_for_simulated_rig(compiled), weak_q31_for_simulated_rig(compiled)
     estimator, whole = config.estimator, fixed.config.estimator
     in_float: dict[str, Any] = {
         "forgetting_s": estimator.forgetting_s,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid.configuration.weak_q31 import engine_to_identify
+from pvid.configuration.weak_q31 import weak_q31_to_identify
 from pvid.identification.advice import advice_on
 from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
@@ -189,9 +189,9 @@ def test_an_input_that_is_known_exactly_costs_fixed_point_no_digits() -> None:
         value, se = of_core(fixed, name)
         assert se < 1.5 * of_core(single, name)[1]
         assert abs(value - one) < 3.5 * se
-    engine = engine_to_identify(answer.model, answer.recording, answer.ranking)
-    place_of_u = engine.sample_names.index("u")
-    assert engine.lsb[place_of_u] < ready(answer.model).model.signal("u").reach / 2**15
+    weak = weak_q31_to_identify(answer.model, answer.recording, answer.ranking)
+    place_of_u = weak.sample_names.index("u")
+    assert weak.lsb[place_of_u] < ready(answer.model).model.signal("u").reach / 2**15
 
 
 SPRING = {"m": 1.3, "c": 3.0, "k": 400.0}

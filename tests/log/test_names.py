@@ -61,7 +61,7 @@ def test_a_lie_about_names_is_refused(text: bytes) -> None:
 
 
 def test_samples_in_another_order_are_those_of_the_mechanism(tmp_path: Path) -> None:
-    """The engine takes the pendulum's height first."""
+    """The identifier takes the pendulum's height first."""
     board = LyingBoard()
     text = b"kapitza\nsample y m\nsample phi rad\np w 1/s^2\np d1\np d2\np c rad"
     names = board.say(message(link.Names, text=text))

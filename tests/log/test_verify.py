@@ -22,9 +22,9 @@ from pvid.cli.verify import command as verify
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogReader
-from pvid.log.rig import engine_text_of_log
+from pvid.log.rig import settings_text_of_log
 from pvid.log.values import Values
-from pvid.log.verify import EngineBoard, Stretch, Verdict, Verifier
+from pvid.log.verify import ReplayableBoard, Stretch, Verdict, Verifier
 
 TICKS = 6400
 LONG = pytest.mark.long
@@ -37,7 +37,7 @@ def sent() -> Sent:
     return list(field_board.messages(field_board.Field(TICKS)))
 
 
-def verified(path: Path, *segments: Sequence[bytes], board: EngineBoard | None = None) -> list[Stretch]:
+def verified(path: Path, *segments: Sequence[bytes], board: ReplayableBoard | None = None) -> list[Stretch]:
     """The stretches of a log of these segments."""
     board = board or field_board.board()
     writer = LogWriter(path, rig=field_board.text())
@@ -272,7 +272,7 @@ def test_a_link_that_broke_without_costing_a_sample_breaks_nothing(tmp_path: Pat
 
 
 def test_unverifiable_segment_has_its_reason(tmp_path: Path, sent: Sent) -> None:
-    def reason(name: str, frames: list[tuple[int, link.Message]], board: EngineBoard | None = None) -> str | None:
+    def reason(name: str, frames: list[tuple[int, link.Message]], board: ReplayableBoard | None = None) -> str | None:
         (stretch,) = verified(tmp_path / name, list(field_board.frames(frames)), board=board)
         assert not stretch.verified
         return stretch.why_not
@@ -404,7 +404,7 @@ def test_a_field_log_of_the_firmware_verifies_and_an_altered_bit_is_named(
     assert "estimates and hashes equal in every bit" in checked.stdout
     assert "lost 0 frames, 0 samples" in checked.stdout
     tick = altered(tmp_path / "a.pvlog", tmp_path / "b.pvlog", change, samples // 2)
-    text = engine_text_of_log(tmp_path / "b.pvlog")
+    text = settings_text_of_log(tmp_path / "b.pvlog")
     assert text is not None
     board = board_of(text)
     (wrong,) = Verifier(board).stretches(LogReader(tmp_path / "b.pvlog"))

@@ -229,5 +229,7 @@ def test_a_text_in_the_place_of_a_number_never_gets_into_c(key: str) -> None:
     lines = MechanismBoardQ31.of_guess(field_board.rig()).text().split("\n")
     (place,) = [i for i, line in enumerate(lines) if line.startswith(f"{key} =")]
     lines[place] = f'{key} = "1; int mark(void)"'
-    with pytest.raises(PvidError, match=r"settings of the engine in the log are damaged: '1; int mark.*' is no number"):
+    with pytest.raises(
+        PvidError, match=r"settings of the identifier in the log are damaged: '1; int mark.*' is no number"
+    ):
         board_of("\n".join(lines))

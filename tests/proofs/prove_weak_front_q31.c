@@ -1,10 +1,10 @@
-/* weak_front_q31.c with the compensators of the pendulum's design (engine_design_q31.h, which tools/prove.py makes):
+/* weak_front_q31.c with the compensators of the pendulum's design (weak_design_q31.h, which tools/prove.py makes):
  * any counts within full scale, block after block from a restart on, with each place of the line's head. */
 #include "prove.h"
 
 #include "weak/weak_front_q31.c" /* one unit: its inline functions are these */
 
-#include "engine_design_q31.h"
+#include "weak_design_q31.h"
 
 /* A conversion modulo 2^32, as of every compiler for the targets. */
 /*@ requires -0x40000000 <= offset <= 0x40000000;
@@ -18,7 +18,7 @@ static pvid_weak_front_q31 front;
 /* D ticks, and the jets if the line is full. Every output is within 28 bits. */
 static bool any_block(int32_t jet[PVID_MAX_INPUTS])
 {
-    const pvid_weak_design_q31 *design = &engine_design_q31;
+    const pvid_weak_design_q31 *design = &weak_design_q31;
     for (size_t tick = 0; tick < design->decimation; tick++) {
         int32_t reading[PVID_MAX_SAMPLES] = {0};
         for (size_t i = 0; i < design->model->samples; i++) {
@@ -38,7 +38,7 @@ static bool any_block(int32_t jet[PVID_MAX_INPUTS])
 /* Beyond full scale nothing is added. */
 static void too_much(void)
 {
-    const pvid_weak_design_q31 *design = &engine_design_q31;
+    const pvid_weak_design_q31 *design = &weak_design_q31;
     int32_t reading[PVID_MAX_SAMPLES] = {0};
     reading[0] = any_i32(design->full_scale[0] + 1, INT32_MAX);
     const bool more = pvid_weak_front_add_q31(&front, design, reading);
@@ -51,7 +51,7 @@ static void too_much(void)
 void main(void)
 {
     int32_t jet[PVID_MAX_INPUTS];
-    pvid_weak_front_init_q31(&front, &engine_design_q31, offset);
+    pvid_weak_front_init_q31(&front, &weak_design_q31, offset);
     too_much();
     const size_t length = (2u * (size_t)front.half) + 1u;
     for (size_t block = 0; block < (3u * length) + 2u; block++) {

@@ -1,4 +1,4 @@
-/* values_q31.c and sums_q31.c with the generated functions and the design of the pendulum (engine_design_q31.h, which
+/* values_q31.c and sums_q31.c with the generated functions and the design of the pendulum (weak_design_q31.h, which
  * tools/prove.py makes): any jets within their reach from a restart on through a half; then sums of any blocks of such
  * channels, at all harmonics, and the window that is joined of them. Channels are within 2^28. */
 #include <string.h>
@@ -7,9 +7,9 @@
 
 #include "weak/sums_q31.h"
 #include "weak/values_q31.h"
-#include "engine_design_q31.h"
+#include "weak_design_q31.h"
 
-#define DESIGN (&engine_design_q31)
+#define DESIGN (&weak_design_q31)
 
 static pvid_weak_values_q31 values;
 static pvid_weak_sums_q31 sums;
@@ -21,7 +21,7 @@ static void any_step(void)
     pvid_weak_entry_q31 channel[PVID_MAX_CHANNELS][PVID_WEAK_BLOCK_Q31];
     int32_t jet[PVID_MAX_INPUTS];
     for (size_t i = 0; i < DESIGN->model->jets; i++) {
-        jet[i] = any_i32(-engine_reach[i], engine_reach[i]);
+        jet[i] = any_i32(-weak_reach[i], weak_reach[i]);
     }
     const pvid_weak_outcome outcome = pvid_weak_values_step_q31(&values, DESIGN, jet, channel[0]);
     /*@ assert outcome != PVID_WEAK_BEYOND; */

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-import playback_engine
+import playback_weak
 import pytest
 from conftest import ROOT
 
@@ -88,7 +88,7 @@ def test_reasons_speak_of_lines_that_stand_there(mutate: ModuleType) -> None:
 
 def test_what_is_played_has_both_kinds_of_steps_and_all_that_a_mechanism_may_have() -> None:
     """What a shape leaves out is not compiled: a change there would be no mutant."""
-    shapes = [files_refine.shape(refine_functions(compiled_of(name)), "a test") for name in playback_engine.BOTH_STAGES]
+    shapes = [files_refine.shape(refine_functions(compiled_of(name)), "a test") for name in playback_weak.BOTH_STAGES]
     numbers = [dict(re.findall(r"^#define PVID_REFINE_(\w+) +(\d+)", shape, re.MULTILINE)) for shape in shapes]
     for name in ("RUNGE_KUTTA", "HIDDEN", "INTEGRALS", "TURNING", "SIGNS", "WIDTHS"):
         assert {int(one[name]) > 0 for one in numbers} == {False, True}, name

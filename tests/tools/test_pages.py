@@ -168,7 +168,7 @@ def test_the_parser_finds_what_a_page_may_contain(tmp_path: Path, monkeypatch: p
 
 
 @pytest.mark.parametrize(
-    "line", ["./tools/pvid nothing", "./tools/pvid bench engine --no-such-option", "./tools/pvid log"]
+    "line", ["./tools/pvid nothing", "./tools/pvid bench weak --no-such-option", "./tools/pvid log"]
 )
 def test_a_command_that_is_only_parsed_is_refused_if_it_is_wrong(line: str) -> None:
     with pytest.raises(click.ClickException):

@@ -10,8 +10,8 @@ import pytest
 
 from pvid.codegen.weak_library import weak_native
 from pvid.compare.weak import compare_counts, compare_recording, compare_samples
-from pvid.configuration.weak import engine_config, samples_of
-from pvid.configuration.weak_q31 import fixed_engine
+from pvid.configuration.weak import samples_of, weak_config
+from pvid.configuration.weak_q31 import weak_q31_for_run
 from pvid.identification.analysis import analysed
 from pvid.identification.core import identify_in_c
 from pvid.model import Integral, Model
@@ -77,7 +77,7 @@ def test_a_cell_that_is_loaded_from_the_start_has_the_right_voltage(core: Core) 
 def test_the_integral_begins_at_the_first_sample_whatever_a_step_is(decimation: int, taps: int) -> None:
     """Up to 38 s before the first step, in which 100 As flow: 2 mV of E. Every bit is that of the twin."""
     recording = loaded_from_the_start()
-    config = engine_config(cell(), recording.signals, design_of(decimation, taps))
+    config = weak_config(cell(), recording.signals, design_of(decimation, taps))
     samples = samples_of(config, recording.signals)
     assert config.design.decimation == decimation
     assert compare_samples(cell(), config, samples).equal
@@ -88,7 +88,7 @@ def test_the_integral_begins_at_the_first_sample_whatever_a_step_is(decimation: 
     error = float(estimate["p"][place]) - TRUTH["E"]
     # behind steps of 8 s the filter of the first step's current is not that of the outputs before it: 5 As
     assert abs(error) < max(4 * float(estimate["covariance"][place][place]) ** 0.5, 1.5e-4 if decimation == 8 else 0.0)
-    fixed = fixed_engine(cell(), recording.signals, design_of(decimation, taps))
+    fixed = weak_q31_for_run(cell(), recording.signals, design_of(decimation, taps))
     assert compare_counts(fixed, fixed.counts_of(recording.signals)).equal
 
 
@@ -107,5 +107,5 @@ def test_an_integral_of_a_product_with_a_rate_has_the_bits_of_the_twin() -> None
     work = np.concatenate([[0.0], np.cumsum(force[1:] * np.diff(place))])
     noise = rng.normal(0.0, 1e-3, (2, len(t)))
     signals = {"F": force, "x": place + noise[0], "y": 1.2 * work + 0.3 + 2.1 * place + noise[1]}
-    config = engine_config(compiled, signals, WeakDesign(100.0, 6.0, decimation=2, taps=15, degree=4))
+    config = weak_config(compiled, signals, WeakDesign(100.0, 6.0, decimation=2, taps=15, degree=4))
     assert compare_samples(compiled, config, samples_of(config, signals)).equal

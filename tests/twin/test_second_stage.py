@@ -1,4 +1,4 @@
-"""The refinement as the second stage of the weak engine: bits of its twin, gaps, freezes, snapshots, refusals."""
+"""The refinement as the second stage of the weak identifier: bits of its twin, gaps, freezes, snapshots, refusals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
-from weak_rig import EngineRig, engine_rig
+from weak_rig import WeakRig, weak_rig
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
@@ -32,7 +32,7 @@ NAME = "rigid_body"  # of order 1, three outputs
 class Refined:
     """A mechanism with both stages."""
 
-    rig: EngineRig
+    rig: WeakRig
     library: WeakNative
     made: RefineFunctions
     settings: RefineConfig
@@ -45,7 +45,7 @@ class Refined:
 
 @cache
 def refined(name: str = NAME) -> Refined:
-    rig, made, simulated = engine_rig(name), refine_functions(compiled_of(name)), simulated_rig(name)
+    rig, made, simulated = weak_rig(name), refine_functions(compiled_of(name)), simulated_rig(name)
     names = made.model
     run = {one: rig.samples[:, k] for k, one in enumerate(_samples(name))}
     settings = refine_settings(made, run, simulated.sample_rate, rig.truth, 2 * simulated.window_s)
@@ -181,7 +181,7 @@ def test_without_a_second_stage_the_weak_form_has_the_same_bits() -> None:
 
 
 def test_a_running_integral_is_an_input() -> None:
-    made, rig = refine_functions(compiled_of("battery_2rc")), engine_rig("battery_2rc")
+    made, rig = refine_functions(compiled_of("battery_2rc")), weak_rig("battery_2rc")
     run = {one: rig.samples[:, k] for k, one in enumerate(_samples("battery_2rc"))}
     settings = refine_settings(made, run, 1.0, rig.truth, 2400.0)
     assert [str(one) for one in made.inputs] == ["i", "z"]

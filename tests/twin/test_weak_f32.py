@@ -1,4 +1,4 @@
-"""Bit equality of the weak engine of any mechanism in C and its numpy twin, after every tick."""
+"""Bit equality of the weak identifier of any mechanism in C and its numpy twin, after every tick."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from weak_rig import EngineRig, Float32, assert_equals_the_twin, engine_rig
+from weak_rig import Float32, WeakRig, assert_equals_the_twin, weak_rig
 
 from pvid.models import mechanisms
 from pvid.settings.enums import Law, Reason
@@ -31,7 +31,7 @@ def updates(reason: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> int:
 @pytest.mark.parametrize("name", mechanisms.names())
 def test_every_mechanism_has_the_bits_of_its_twin(name: str) -> None:
     """Gaps, a frozen stretch, errors of the equations, compensation; conditions that publish early."""
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     samples = with_gaps(rig.samples[:9000])
     variance = np.full(rig.config.design.model.kinds, 1e-9, np.float32)
     trust = TrustConfig(se_max=10.0, groups_min=1, kappa_min=0.0)
@@ -46,12 +46,12 @@ def test_every_mechanism_has_the_bits_of_its_twin(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["dc_motor", "furuta", "battery_2rc"])
 def test_the_rig_s_own_settings_have_the_bits_of_the_twin(name: str) -> None:
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     record = assert_equals_the_twin(rig.native, rig.config, rig.samples[:12000])[0]
     assert (record.published[-1] != record.published[0]).any()
 
 
-def starts(rig: EngineRig) -> list[EstimatorConfig]:
+def starts(rig: WeakRig) -> list[EstimatorConfig]:
     """Four starts with four times of forgetting, without and with short ones."""
     own = rig.config.estimator
     lanes = []
@@ -63,7 +63,7 @@ def starts(rig: EngineRig) -> list[EstimatorConfig]:
 
 @pytest.mark.parametrize(("name", "compensation"), [("kapitza", False), ("rigid_body", True)])
 def test_lanes_with_other_starts_and_forgetting_equal_the_twin(name: str, compensation: bool) -> None:
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     config = replace(rig.config, gate=NO_GATE, compensation=compensation)
     records = assert_equals_the_twin(rig.native, config, rig.samples[:9000], starts(rig))
     assert len({record.p[-1].tobytes() for record in records}) == 4
@@ -74,7 +74,7 @@ def test_lanes_with_other_starts_and_forgetting_equal_the_twin(name: str, compen
     [(Law.PSEUDOVELOCITY, 0.0, 1), (Law.STATIONARY, 0.5, 1), (Law.STATIONARY, 0.0, 3)],
 )
 def test_laws_and_divider_equal_the_twin(law: Law, feedback_hz: float, divider: int) -> None:
-    rig = engine_rig("cart_pendulum")
+    rig = weak_rig("cart_pendulum")
     estimator = replace(rig.config.estimator, law=law, feedback_hz=feedback_hz, divider=divider)
     record = assert_equals_the_twin(rig.native, replace(rig.config, estimator=estimator), rig.samples[:7000])[0]
     assert (record.p[-1] != record.p[0]).any()
@@ -96,7 +96,7 @@ def test_laws_and_divider_equal_the_twin(law: Law, feedback_hz: float, divider: 
     ],
 )
 def test_every_size_equals_the_twin(name: str, functions: int, hop: int, decimation: int) -> None:
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     config = rig.resized(functions=functions, hop=hop, decimation=decimation)
     record = assert_equals_the_twin(rig.native, config, rig.samples[:6000])[0]
     moved = bool((record.p[-1] != record.p[0]).any())
@@ -105,7 +105,7 @@ def test_every_size_equals_the_twin(name: str, functions: int, hop: int, decimat
     assert moved or (record.reason == Reason.HELD_NOT_EXCITED).any()
 
 
-def noise_of(rig: EngineRig) -> Float32:
+def noise_of(rig: WeakRig) -> Float32:
     """The rig at rest: its first sample with the noise of the run."""
     curved = np.diff(rig.samples[:4000], n=4, axis=0)
     sd = curved.std(axis=0) / np.sqrt(70)  # white noise of variance 1 has 70 in its fourth difference
@@ -116,7 +116,7 @@ def noise_of(rig: EngineRig) -> Float32:
 @pytest.mark.parametrize(("name", "compensation"), [("furuta", True), ("dc_motor", False)])
 def test_noise_alone_is_no_excitation(name: str, compensation: bool) -> None:
     """S exceeds a millionth of its diagonal there, and p moved before: the information is that of the noise."""
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     config = replace(rig.config, compensation=compensation)
     record = assert_equals_the_twin(rig.native, config, noise_of(rig))[0]
     held = record.reason == Reason.HELD_NOT_EXCITED
@@ -141,12 +141,12 @@ def hostile(samples: Float32) -> Float32:
 
 @pytest.mark.parametrize("name", ["kapitza", "dc_motor", "cart_pendulum", "battery_2rc"])
 def test_hostile_samples_equal_the_twin_and_leave_finite_numbers(name: str) -> None:
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     record = assert_equals_the_twin(rig.native, rig.config, hostile(rig.samples))[0]
     assert np.isin(record.reason, (Reason.REJECTED_NOT_FINITE, Reason.REJECTED_SATURATED)).any()
 
 
-def limited(rig: EngineRig) -> WeakConfig:
+def limited(rig: WeakRig) -> WeakConfig:
     """Ranges that the first sample exceeds now and then; the last one must move."""
     samples = rig.samples
     ranges = 2 * np.abs(samples).max(axis=0)
@@ -158,7 +158,7 @@ def limited(rig: EngineRig) -> WeakConfig:
 
 @pytest.mark.parametrize("name", ["cart_pendulum", "dc_motor"])
 def test_windows_beyond_the_range_or_without_a_drive_equal_the_twin(name: str) -> None:
-    rig = engine_rig(name)
+    rig = weak_rig(name)
     samples = rig.samples.copy()
     samples[6000:9000, -1] = samples[6000, -1]
     record = assert_equals_the_twin(rig.native, limited(rig), samples)[0]
@@ -167,7 +167,7 @@ def test_windows_beyond_the_range_or_without_a_drive_equal_the_twin(name: str) -
 
 
 def test_the_gate_rejects_a_jolt_in_both() -> None:
-    rig = engine_rig("furuta")
+    rig = weak_rig("furuta")
     samples = rig.samples.copy()
     samples[18000:18040, 0] += np.float32(3.0)
     record = assert_equals_the_twin(rig.native, rig.config, samples)[0]
@@ -175,13 +175,13 @@ def test_the_gate_rejects_a_jolt_in_both() -> None:
 
 
 def test_a_soft_sign_equals_the_twin() -> None:
-    rig = engine_rig("two_link_arm", soft=True)
+    rig = weak_rig("two_link_arm", soft=True)
     assert (rig.config.design.sign_width > 0).all()
     assert_equals_the_twin(rig.native, rig.config, rig.samples[:6000])
 
 
 def test_a_run_in_two_pieces_has_the_bits_of_one() -> None:
-    rig = engine_rig("cart_pendulum")
+    rig = weak_rig("cart_pendulum")
     whole, pieces = rig.native.identifier_of(rig.config), rig.native.identifier_of(rig.config)
     whole.run_samples(rig.samples[:6000])
     for part in (slice(0, 1), slice(1, 2345), slice(2345, 2346), slice(2346, 6000)):
@@ -190,7 +190,7 @@ def test_a_run_in_two_pieces_has_the_bits_of_one() -> None:
 
 
 def test_a_gap_is_a_missing_sample_without_a_tick() -> None:
-    rig = engine_rig("kapitza")
+    rig = weak_rig("kapitza")
     told, seen = rig.native.identifier_of(rig.config), rig.native.identifier_of(rig.config)
     for core in (told, seen):
         core.run_samples(rig.samples[:5000])
@@ -204,7 +204,7 @@ def test_a_gap_is_a_missing_sample_without_a_tick() -> None:
 
 def test_the_sums_of_a_run_outlive_a_gap() -> None:
     """The battery's charge is an integral since the start: the twin's goes on where the core's does."""
-    rig = engine_rig("battery_2rc")
+    rig = weak_rig("battery_2rc")
     assert rig.config.design.model.runs == 1
     samples = rig.samples[:9000].copy()
     samples[4000:4040] = np.nan
@@ -212,10 +212,10 @@ def test_the_sums_of_a_run_outlive_a_gap() -> None:
     assert updates(record.reason) + (record.reason == Reason.HELD_UNCERTAIN).sum() > 0
 
 
-def random_case(seed: int) -> tuple[EngineRig, WeakConfig, Float32]:
+def random_case(seed: int) -> tuple[WeakRig, WeakConfig, Float32]:
     """A mechanism with random sizes, settings and limits, and a piece of its run with random faults."""
     random = np.random.default_rng(seed)
-    rig = engine_rig(str(random.choice(mechanisms.names())))
+    rig = weak_rig(str(random.choice(mechanisms.names())))
     design, kinds = rig.config.design, rig.config.design.model.kinds
     functions = int(random.integers(4, design.functions + 1))
     hop = 8 * int(random.integers((functions + design.power) // 8 + 2, 20))
@@ -250,7 +250,7 @@ def test_random_settings_and_faults_equal_the_twin(seed: int) -> None:
 def test_an_equation_s_own_error_that_comes_and_goes_has_the_bits_of_the_twin() -> None:
     """White noise of a motor's recorded voltage, in the first half of the run: the variance of the error rises, older
     rows count no more; then it falls."""
-    rig = engine_rig("dc_motor")
+    rig = weak_rig("dc_motor")
     samples = rig.samples[:12000].copy()
     place = rig.config.design.model.sample_names.index("V")
     samples[:6000, place] += np.random.default_rng(2).standard_normal(6000).astype(np.float32)

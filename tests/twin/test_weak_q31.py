@@ -1,4 +1,4 @@
-"""The fixed-point weak engine of every shipped mechanism has the bits of its printed twin, after every tick."""
+"""The fixed-point weak identifier of every shipped mechanism has the bits of its printed twin, after every tick."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "solve/state_q31.h"
-#include "engine_q31.h"
+#include "kapitza_plant_q31.h"
 #include "first_order.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"

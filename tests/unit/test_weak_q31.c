@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "engine_q31.h"
+#include "kapitza_plant_q31.h"
 #include "weak/weak_front_q31.h"
 #include "weak/accumulator_q31.h"
 #include "weak/weak_finish_q31.h"
@@ -15,7 +15,7 @@
 #include "pvid/pvid_q31.h"
 #include "pvid/snapshot_weak_q31.h"
 
-#define HOP ENGINE_HOP_TICKS
+#define HOP PLANT_HOP_TICKS
 #define WINDOWS(ticks) ((((ticks) - FIRST_TICKS) / HOP) + 1)
 #define ROWS 5           /* of a window: seven functions less two nuisances */
 #define FIRST_TICKS 1814 /* half a filter on either side of a window; then one window each hop */
@@ -41,7 +41,7 @@ static void start(void)
 static pvid_reason tick(pvid_weak_q31 *self, plant_state *plant, int32_t zero)
 {
     int32_t reading[2];
-    engine_reading(plant, zero, reading);
+    plant_reading(plant, zero, reading);
     return pvid_weak_step_q31(self, reading);
 }
 
@@ -85,9 +85,9 @@ static void the_pendulum_is_identified_with_its_encoders_zero(void **state)
         const pvid_estimate_q31 *estimate = pvid_weak_estimate_q31(&identifier);
         assert_true(identifier.trust.published);
         for (int k = 0; k < 3; k++) { /* a 14-bit encoder, 24 windows */
-            assert_near((engine_p_unit[k] * (double)estimate->p[k]) / plant_p[k], 1.0, 5.0e-3);
+            assert_near((plant_p_unit[k] * (double)estimate->p[k]) / plant_p[k], 1.0, 5.0e-3);
         }
-        assert_near(engine_p_unit[3] * (double)estimate->p[3], zeros[i] * engine_lsb[ENGINE_PHI], 2.0e-4);
+        assert_near(plant_p_unit[3] * (double)estimate->p[3], zeros[i] * plant_lsb[PLANT_PHI], 2.0e-4);
         assert_int_equal(judged(reasons), WINDOWS(20000));
         assert_int_equal(reasons[PVID_ACCUMULATED] + judged(reasons) + reasons[PVID_WARMING_UP], 20000);
         assert_int_equal(identifier.estimator.counters.rows, ROWS * WINDOWS(20000));
@@ -100,8 +100,8 @@ static void a_reading_beyond_full_scale_restarts_windows_and_keeps_sums(void **s
     static const int32_t offset[2] = {-7, 40};
     config.offset = offset;
     start();
-    const int32_t y_max = kapitza_full_scale_q31[ENGINE_Y];
-    const int32_t phi_max = kapitza_full_scale_q31[ENGINE_PHI];
+    const int32_t y_max = kapitza_full_scale_q31[PLANT_Y];
+    const int32_t phi_max = kapitza_full_scale_q31[PLANT_PHI];
     const int32_t good[4][2] = {{0, phi_max}, {0, -phi_max}, {y_max, 0}, {-y_max, 0}};
     const int32_t bad[4][2] = {{0, phi_max + 1}, {0, -phi_max - 1}, {y_max + 1, 0}, {-y_max - 1, 0}};
     const int32_t far[4][2] = {{-7, INT32_MIN}, {-7, INT32_MAX}, {INT32_MIN, 40}, {INT32_MAX, 40}};
@@ -149,8 +149,8 @@ static void start_is_held_with_reason_without_drive(void **state)
     plant_state plant = released_plant();
     for (int i = 0; i < 10000; i++) { /* the pendulum swings, the pivot stands */
         int32_t reading[2];
-        engine_reading(&plant, 0, reading);
-        reasons[step(200, reading[ENGINE_PHI])]++;
+        plant_reading(&plant, 0, reading);
+        reasons[step(200, reading[PLANT_PHI])]++;
     }
     assert_memory_equal(identifier.estimator.p, config.estimator.start, 4 * sizeof(int32_t));
     assert_int_equal(reasons[PVID_HELD_NOT_EXCITED], WINDOWS(10000));
@@ -176,7 +176,7 @@ static void laws_and_forgetting_take_their_settings(void **state)
     pvid_estimator_assess_q31(&identifier.estimator, &estimate);
     assert_in_range(estimate.weight, 7 * ROWS, 8 * ROWS + 2); /* rows of eight windows */
     for (int k = 0; k < 3; k++) {
-        assert_near((engine_p_unit[k] * (double)identifier.estimator.p[k]) / plant_p[k], 1.0, 0.02);
+        assert_near((plant_p_unit[k] * (double)identifier.estimator.p[k]) / plant_p[k], 1.0, 0.02);
     }
 }
 
@@ -242,7 +242,7 @@ static void random_counts_keep_every_bound(void **state)
     start();
     uint32_t generator = 1u;
     for (int i = 0; i < 30000; i++) {
-        const int32_t range[2] = {((i / 3000) % 2 == 0) ? 3 : 300, kapitza_full_scale_q31[ENGINE_PHI]};
+        const int32_t range[2] = {((i / 3000) % 2 == 0) ? 3 : 300, kapitza_full_scale_q31[PLANT_PHI]};
         int32_t reading[2];
         for (int k = 0; k < 2; k++) {
             generator = (generator * 1664525u) + 1013904223u;
@@ -443,12 +443,12 @@ static void ticks_without_work_have_their_answer(void **state)
     assert_int_equal(identifier.task, PVID_WARMING_UP);
     plant_state plant = released_plant();
     uint32_t idle = 0;
-    for (int i = 0; i < (5 * ENGINE_HOP_TICKS); i++) {
+    for (int i = 0; i < (5 * PLANT_HOP_TICKS); i++) {
         const pvid_reason reason = tick(&identifier, &plant, 0);
         idle += (identifier.task == (uint8_t)PVID_ACCUMULATED) ? 1u : 0u;
-        assert_true((reason != PVID_WARMING_UP) || (i < (3 * ENGINE_HOP_TICKS)));
+        assert_true((reason != PVID_WARMING_UP) || (i < (3 * PLANT_HOP_TICKS)));
     }
-    assert_true(idle > (uint32_t)ENGINE_HOP_TICKS);
+    assert_true(idle > (uint32_t)PLANT_HOP_TICKS);
 }
 
 int main(void)

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "engine_q31.h"
+#include "kapitza_plant_q31.h"
 #include "persist/fingerprint_weak_q31.h"
 #include "pvid/pvid_q31.h"
 #include "weak/valid_q31.h"

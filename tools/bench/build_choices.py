@@ -10,7 +10,7 @@ from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image import build_with, mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.refined_image import build_refined_image
-from pvid.board.sizes import Footprint, built_engine, measured, refined_replay
+from pvid.board.sizes import Footprint, built_weak, measured, refined_replay
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.settings.enums import Core
 
@@ -66,7 +66,7 @@ def footprint_of(choice: Choice, place: int) -> Footprint:
     if choice.refined:
         both = refined_replay(board)
         image, tree = build_refined_image(board, both, f"choice-{place}", choices)
-        return measured(board, built_engine(image, tree, both.weak.name))[0]
+        return measured(board, built_weak(image, tree, both.weak.name))[0]
     if choice.core == "f32":
         run = mechanism_run("kapitza", long=True)
         name, files, fitted = run.name, mechanism_image.files_of(run), fitted_sizes(run.config)
@@ -75,7 +75,7 @@ def footprint_of(choice: Choice, place: int) -> Footprint:
         name, files, fitted = fixed.name, mechanism_image_q31.files_of(fixed), fixed.sizes
     sizes = fitted | dict(choice.sizes)
     image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=choices)
-    return measured(board, built_engine(image, tree, name))[0]
+    return measured(board, built_weak(image, tree, name))[0]
 
 
 def rows_of(progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:

@@ -101,12 +101,12 @@ def _of_mechanisms(names: tuple[str, ...], seeds: int, advance: Advance) -> Tabl
     return mechanisms.tables(names, seeds, seeds // 4, lambda _: advance())
 
 
-def _of_engine(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
-    from bench import engine
+def _of_weak(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
+    from bench import weak
 
     return [
-        ("engine", engine.HEADER, engine.table(names, seeds, advance)),
-        ("engine-q31", engine.FIXED_HEADER, engine.fixed_table(names, seeds, advance)),
+        ("weak", weak.HEADER, weak.table(names, seeds, advance)),
+        ("weak-q31", weak.FIXED_HEADER, weak.fixed_table(names, seeds, advance)),
     ]
 
 
@@ -176,7 +176,7 @@ def _of_verify(names: tuple[str, ...], ticks: int, advance: Advance) -> Tables:
 _ONCE = (1, "--runs", "Of each image.")
 TABLES = (
     Table("mechanisms", "Errors in float64 beside the Cramer-Rao bound, and of imperfect rigs.", _of_mechanisms),
-    Table("engine", "Errors of the weak form in C beside float64, and in fixed point beside float32.", _of_engine),
+    Table("weak", "Errors of the weak form in C beside float64, and in fixed point beside float32.", _of_weak),
     Table("refine-mechanisms", "Both stages in C: errors beside the Cramer-Rao bound.", _of_refinement),
     Table("hard", "Coarse sensors, noise, little drive, no motion: what is published, and what is wrong.", _of_hard),
     Table(

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
-from pvid.board.engine_image import engine_image
 from pvid.board.mechanism_image import mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.profile import profile
 from pvid.board.sizes import Configuration, measure
+from pvid.board.weak_image import weak_image
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.core.sources import INCLUDES
 from pvid.settings.enums import Core
@@ -25,7 +25,7 @@ Parts = Sequence[tuple[str, str]]
 FIXED_BOARDS = ("mps2-an386", "microbit")
 FIXED_HEADER = ("part of a tick", *(f"{BOARDS[name].core}" for name in FIXED_BOARDS))
 
-# Sources that a part of the engine has of its own; what is left is arithmetic that all parts share.
+# Sources that a part of the identifier has of its own; what is left is arithmetic that all parts share.
 _FIXED_PARTS = (
     ("samples to the block sums, schedule", r"weak_q31|accumulator_q31"),
     ("jets at a step", r"weak_front_q31"),
@@ -155,7 +155,7 @@ def state_rows(model: str) -> list[tuple[str, ...]]:
 
 def text_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the code of an image by part, as in TEXT_HEADER."""
-    image = engine_image(BOARDS[BOARD], model, "f32").image
+    image = weak_image(BOARDS[BOARD], model, "f32").image
     command = [f"{BOARDS[BOARD].tool_prefix}nm", "--line-numbers", "--print-size", "--defined-only", str(image)]
     listing = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     parts: Counter[str] = Counter()

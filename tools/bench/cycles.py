@@ -84,21 +84,21 @@ def _case(
     return Case(title, lambda board: build(board, run), lambda: hashes(run))
 
 
-def _float_engine(model: str) -> Case:
+def _weak_f32(model: str) -> Case:
     run = mechanism_image.mechanism_run(model)
     return _case(f"weak, f32, {model}", run, mechanism_image.build_mechanism_image, mechanism_image.native_hashes)
 
 
-def _fixed_engine(model: str) -> Case:
+def _weak_q31(model: str) -> Case:
     run = mechanism_image_q31.fixed_run(model)
     return _case(f"weak, q31, {model}", run, mechanism_image_q31.build_fixed_image, mechanism_image_q31.native_hashes)
 
 
 # What is made of each row of the table, and the cores that play it.
 _ROWS: tuple[tuple[Callable[[], Case], tuple[Hardware, ...]], ...] = (
-    (lambda: _float_engine("kapitza"), FPUS),
-    (lambda: _float_engine("dc_motor"), FPUS),
-    (lambda: _fixed_engine("kapitza"), (WITHOUT,)),
+    (lambda: _weak_f32("kapitza"), FPUS),
+    (lambda: _weak_f32("dc_motor"), FPUS),
+    (lambda: _weak_q31("kapitza"), (WITHOUT,)),
 )
 STEPS = sum(len(cores) for _, cores in _ROWS)
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from bench.board_engine import Answer, FixedBoard, FloatBoard, board_of
+from bench.board_weak import Answer, FixedBoard, FloatBoard, board_of
 from bench.mechanisms import design_of, size_of, start_of
 from pvid.configuration.weak import neglected_part
 from pvid.models.drive import Drive, Scaled

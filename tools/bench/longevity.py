@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.accidents import role_of
-from bench.board_engine import FixedBoard, FloatBoard, board_of
+from bench.board_weak import FixedBoard, FloatBoard, board_of
 from bench.mechanisms import design_of, size_of, start_of
 from pvid.core.native import Publisher
 from pvid.models.mechanisms import compiled_of
@@ -179,7 +179,7 @@ def outcome(name: str, lane: Lane, disturbance: Disturbance, ticks: int) -> Outc
         judged = record.reason[~np.isin(record.reason, (Reason.ACCUMULATED, Reason.WARMING_UP))]
         found.reason = Reason(int(judged[-1])) if len(judged) else found.reason
         last = record.published[-1], record.published_se[-1]
-    p, se = (made.engine.values(one) if isinstance(made, FixedBoard) else one.astype(np.float64) for one in last)
+    p, se = (made.weak.values(one) if isinstance(made, FixedBoard) else one.astype(np.float64) for one in last)
     of = simulation_of(name, disturbance.changes)
     off = np.abs(p - of.truth)
     found.percent, found.z = 100 * float(np.max(off / size_of(of))), float(np.max(off / se))

@@ -32,12 +32,12 @@ from pvid.base.errors import PvidError
 from pvid.cli.identify_run import recording_of
 from pvid.codegen.build import build
 from pvid.codegen.generated import GeneratedModel, Options
-from pvid.codegen.weak_q31 import FixedEngine
+from pvid.codegen.weak_q31 import WeakQ31
 from pvid.compare.bits import Comparison
 from pvid.compare.weak import compare_recording
 from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import config_for_recording
-from pvid.configuration.weak_q31 import engine_for_recording
+from pvid.configuration.weak_q31 import weak_q31_for_recording
 from pvid.core.host_compiler import compiled_once, host_compiler
 from pvid.core.sources import INCLUDES, core_sources
 from pvid.deploy.deployment import Deployment
@@ -270,27 +270,27 @@ def _built(road: Road, answer: Analysis, folder: Path) -> None:
     """Generated files and packages, compiled with the project's warnings as errors, and what they print."""
     compiled, recording, ranking = answer.model, answer.recording, answer.ranking
     design: WeakConfig | None = None
-    engine: FixedEngine | None = None
+    weak: WeakQ31 | None = None
     refine: RefineConfig | None = None
     with road.stage("design"):
         design = config_for_recording(compiled, recording, ranking=ranking)
     with road.stage("fixed design"):
-        engine = engine_for_recording(compiled, recording, ranking=ranking)
+        weak = weak_q31_for_recording(compiled, recording, ranking=ranking)
     if design is not None and GeneratedModel(compiled, "bench").refinement.made is not None:
         with road.stage("second design"):
             refine = refine_design(compiled, design, recording.signals)
     files = folder / "generated"
     with road.stage("build"):
-        options = Options(design=design, fixed_engine=engine, refine_design=refine)
+        options = Options(design=design, weak_q31_for_run=weak, refine_design=refine)
         build(GeneratedModel(compiled, "bench", options), files)
     if "build" in road.reached:
         with road.stage("compile"):
-            _compile(road, files, compiled.name, design is not None, engine is not None, refine is not None)
+            _compile(road, files, compiled.name, design is not None, weak is not None, refine is not None)
     deployed: list[tuple[str, Callable[[], Deployment]]] = []
     if design is not None:
         deployed.append(("deploy", lambda: deployment_f32(compiled, design, recording.signals, "bench", refine)))
-    if engine is not None:
-        deployed.append(("fixed deploy", lambda: deployment_q31(engine, recording.signals, "bench")))
+    if weak is not None:
+        deployed.append(("fixed deploy", lambda: deployment_q31(weak, recording.signals, "bench")))
     for name, made in deployed:
         with road.stage(name):
             _play(road, name, made(), folder / name.replace(" ", "_"))

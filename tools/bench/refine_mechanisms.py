@@ -13,7 +13,7 @@ from bench.mechanisms import CASES, size_of, start_of
 from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.refine import refine_design
-from pvid.configuration.weak import engine_config, samples_of
+from pvid.configuration.weak import samples_of, weak_config
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.models import mechanisms
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
@@ -65,7 +65,7 @@ class Case:
         compiled, rig = mechanisms.compiled_of(name), at_rate(simulated_rig(name), rate)
         simulation = RigSimulation.of(compiled, rig, whole=True)
         run, truth = simulation.run(), simulation.truth
-        config = engine_config(compiled, run, WeakDesign(rate, rig.window_s, **rig.design), truth)  # type: ignore[arg-type]
+        config = weak_config(compiled, run, WeakDesign(rate, rig.window_s, **rig.design), truth)  # type: ignore[arg-type]
         return cls(simulation, config, refine_design(compiled, config, run, truth))
 
     def identifier(self, seed: int) -> RefinedIdentifier:

@@ -23,7 +23,7 @@ from pvid.board.strong_board import StrongBoard
 from pvid.link import frames as link
 from pvid.link.frames import MAX_P
 from pvid.log.file import LogWriter
-from pvid.log.verify import EngineBoard
+from pvid.log.verify import ReplayableBoard
 from pvid.log.witness import CoreWitness
 from pvid.twin import fnv
 
@@ -99,7 +99,7 @@ def verified(path: Path, *options: str) -> tuple[float, str]:
     return after.children_user + after.children_system - before.children_user - before.children_system, done.stdout
 
 
-def us_a_tick(board: EngineBoard, samples: Any) -> float:
+def us_a_tick(board: ReplayableBoard, samples: Any) -> float:
     """Processor time of the printed twin for a tick [us]."""
     twin = board.twin_of(board.configure(1, EVERY, EVERY))  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):

@@ -109,11 +109,11 @@ def _identify(
         for one, path in zip(several, paths, strict=True)
     ]
     recording, compiled = read_all(found, sources, _names(paths), columns)
-    engine = CORES.get(core or "")
-    of_each = own_of(compiled, recording, own, shared, in_c=engine is not None)
-    if engine is None:
+    in_c = CORES.get(core or "")
+    of_each = own_of(compiled, recording, own, shared, in_c=in_c is not None)
+    if in_c is None:
         return result_of(identified(recording, compiled, refine=refine, own=of_each))
-    return result_of(identify_in_c(identified(recording, compiled, refine=False, own=of_each), engine.name))
+    return result_of(identify_in_c(identified(recording, compiled, refine=False, own=of_each), in_c.name))
 
 
 def _names(paths: Sequence[Path | None]) -> tuple[str, ...]:

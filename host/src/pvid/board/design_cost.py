@@ -15,11 +15,11 @@ from pvid.board.mechanism_board import refuse_unrefined
 from pvid.board.mechanism_image import build_mechanism_image, long_run, refuse_float_on_avr, run_of_samples
 from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image
 from pvid.board.refined_image import RefinedRun, build_refined_image, light_work
-from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_engine, figures_of, measured
+from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_weak, figures_of, measured
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native, weak_native_q31
-from pvid.codegen.weak_q31 import FixedEngine
+from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
 from pvid.configuration.weak import (
     Run,
@@ -28,7 +28,7 @@ from pvid.configuration.weak import (
     samples_of,
     simulated_run_of,
 )
-from pvid.configuration.weak_q31 import engine_for_recording, engine_for_rig_like_the_shipped
+from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_rig_like_the_shipped
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.settings.cores import FLOAT
@@ -125,14 +125,14 @@ class CostedDesign:
     Attributes
     ----------
     compiled : the mechanism
-    engine : its weak form
+    weak : its weak form
     run : name of each signal -> samples
     refine : settings of the second stage, as `model build` prints them; None: without
     no_refinement : why there are none, where they are asked for
     """
 
     compiled: CompiledModel
-    engine: WeakConfig | FixedEngine
+    weak: WeakConfig | WeakQ31
     run: Run
     refine: RefineConfig | None = None
     no_refinement: str | None = None
@@ -144,11 +144,11 @@ class CostedDesign:
         Raises
         ------
         PvidError
-            Where the engine does not have what the model needs.
+            Where the identifier does not have what the model needs.
         """
         run = recording.signals
         if asked.core != FLOAT.name:
-            return cls(compiled, engine_for_recording(compiled, recording), run)
+            return cls(compiled, weak_q31_for_recording(compiled, recording), run)
         config = config_for_recording(compiled, recording)
         return cls(compiled, config, run)._with_refinement(asked, lambda: refine_design(compiled, config, run))
 
@@ -156,7 +156,7 @@ class CostedDesign:
     def of_shipped_rig(cls, asked: Asked, compiled: CompiledModel) -> CostedDesign:
         """That of a shipped mechanism's simulated rig; raises as of_recording."""
         if asked.core != FLOAT.name:
-            return cls(compiled, engine_for_rig_like_the_shipped(compiled), simulated_run_of(compiled)[0])
+            return cls(compiled, weak_q31_for_rig_like_the_shipped(compiled), simulated_run_of(compiled)[0])
         config = config_for_rig_like_the_shipped(compiled)
         run = full_motion_of(compiled) if asked.refined else simulated_run_of(compiled)[0]
         return cls(compiled, config, run)._with_refinement(asked, lambda: refine_for_simulated_rig(compiled, config))
@@ -188,9 +188,9 @@ class CostedDesign:
         PvidError
             When a compiler or the emulator is missing, or the image does not fit or fails.
         """
-        if isinstance(self.engine, FixedEngine):
-            return _in_fixed_point(asked, self.engine, self.run)
-        return _in_float(asked, self.compiled, self.engine, self.run, refine)
+        if isinstance(self.weak, WeakQ31):
+            return _in_fixed_point(asked, self.weak, self.run)
+        return _in_float(asked, self.compiled, self.weak, self.run, refine)
 
 
 def _work(refine: RefineConfig) -> tuple[int, int]:
@@ -207,7 +207,7 @@ def _in_float(
         record = weak_native(compiled, config.design).identifier_of(config).run_samples(run.samples, sums=False)
         first = _first(record.reason)
         run = run.shortened(_enough(first, config.ticks_needed, period, len(run.counts)))
-        built = built_engine(*build_mechanism_image(asked.board, run), run.name)
+        built = built_weak(*build_mechanism_image(asked.board, run), run.name)
         return _measured(asked, run.name, built, record.hash, first, rate)
     both = RefinedRun(run, refine_functions(compiled), refine)
     record_of_both = both.native().run_both(run.samples)
@@ -215,21 +215,21 @@ def _in_float(
     block = refine.block * BIG_STEP * refine.ratio
     run = run.shortened(_enough(first, config.ticks_needed, block, len(run.counts)))
     both = replace(both, weak=run if first is None else replace(run, measure_from=first))
-    built = built_engine(*build_refined_image(asked.board, both), run.name)
+    built = built_weak(*build_refined_image(asked.board, both), run.name)
     return _measured(asked, run.name, built, record_of_both.hash, first, rate, refine)
 
 
-def _in_fixed_point(asked: Asked, engine: FixedEngine, signals: Run) -> Cost:
-    counts = engine.counts_of(signals)
-    run = FixedRun(engine, counts, 0)
+def _in_fixed_point(asked: Asked, weak: WeakQ31, signals: Run) -> Cost:
+    counts = weak.counts_of(signals)
+    run = FixedRun(weak, counts, 0)
     run = replace(run, counts=counts[: _most_ticks(asked.board, run.count_bytes * counts.shape[1])])
-    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    identifier = weak_native_q31(weak.made, weak.parameters, weak.config).identifier()
     record = identifier.run_samples(run.counts, sums=False)
     first = _first(record.reason)
-    period = engine.config.design.hop * engine.config.design.decimation
-    run = run.shortened(_enough(first, engine.ticks_needed, period, len(run.counts)))
-    built = built_engine(*build_fixed_image(asked.board, run), run.name)
-    return _measured(asked, run.name, built, record.hash, first, engine.sample_rate)
+    period = weak.config.design.hop * weak.config.design.decimation
+    run = run.shortened(_enough(first, weak.ticks_needed, period, len(run.counts)))
+    built = built_weak(*build_fixed_image(asked.board, run), run.name)
+    return _measured(asked, run.name, built, record.hash, first, weak.sample_rate)
 
 
 def _most_ticks(board: Board, bytes_a_tick: int) -> int:

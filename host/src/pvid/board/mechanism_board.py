@@ -1,4 +1,4 @@
-"""A board that identifies a mechanism by the weak engine: settings, generated C, its text in a log."""
+"""A board that identifies a mechanism by the weak form: settings, generated C, its text in a log."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from pvid.configuration.weak import (
     config_for_recording,
     config_for_simulated_rig,
     config_to_identify,
-    engine_config,
     neglected_part,
     samples_of,
+    weak_config,
     with_neglected,
 )
 from pvid.core.native import Native
@@ -98,7 +98,7 @@ class MechanismBoard(FloatBoard):
         Raises
         ------
         PvidError
-            When the recording is too short, or the engine or its second stage does not have what the model needs.
+            When the recording is too short, or the identifier or its second stage does not have what the model needs.
         """
         recording.refuse_damaged()
         whole = recording.whole()
@@ -119,7 +119,7 @@ class MechanismBoard(FloatBoard):
         Raises
         ------
         PvidError
-            Where there is no such mechanism, or the engine or its second stage does not have what it needs.
+            Where there is no such mechanism, or the identifier or its second stage does not have what it needs.
         """
         simulated = simulated_rig(name)
         rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
@@ -144,11 +144,11 @@ class MechanismBoard(FloatBoard):
         Raises
         ------
         PvidError
-            Where there is no such simulation (see `nominal_run`), or the engine does not have what the model needs.
+            Where there is no such simulation (see `nominal_run`), or the identifier does not have what the model needs.
         """
         made = nominal_run(rig)
         run = made.recording.signals
-        config = engine_config(made.compiled, run, made.chosen.design, made.p)
+        config = weak_config(made.compiled, run, made.chosen.design, made.p)
         config = with_neglected(config, neglected_part(made.compiled, run))
         # What the rig really reads is not known: a height from the floor is no fault.
         config = replace(config, range=None)
@@ -222,7 +222,7 @@ class MechanismBoard(FloatBoard):
         return self._weak(config) if self.refine is None else self._both_stages(config)
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
-        """Running hash after every tick in the engine on this machine [ticks]."""
+        """Running hash after every tick in the identifier on this machine [ticks]."""
         samples = self.readings(*signals)
         if self.refine is None:
             return self._weak(self.config).run_samples(samples, sums=False).hash
@@ -240,13 +240,13 @@ class MechanismBoard(FloatBoard):
         return weak_native(self.compiled, self.config.design, self.equations).refined_of(config, self.refine)
 
     def text(self) -> str:
-        """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
+        """The rig file with the identifier's settings, for a log; `parse` gives the same board back."""
         lines = [f"{name} = {written(value)}" for name, value in _flat(self.config, self.refine).items()]
         return "\n".join([self.rig.text(), f"[{TABLE}]", *lines, ""])
 
     @classmethod
-    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoard:
-        """From the rig and the table `engine` of the text of a log.
+    def of_tables(cls, rig: MechanismRig, settings: Mapping[str, Any]) -> MechanismBoard:
+        """From the rig and the table of settings in the text of a log.
 
         Raises
         ------
@@ -254,9 +254,9 @@ class MechanismBoard(FloatBoard):
             Where it is damaged.
         """
         compiled = rig.compiled()
-        config = _config(compiled, engine)
+        config = _config(compiled, settings)
         nothing = np.zeros((0, config.design.model.samples), np.float32)
-        return cls(rig, compiled, config, nothing, _refine(engine))
+        return cls(rig, compiled, config, nothing, _refine(settings))
 
 
 def _refine_header(settings: RefineConfig, shown: Sequence[int]) -> str:
@@ -298,8 +298,8 @@ def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismB
         Where it breaks off, or names a mechanism that is not shipped and not that of this call.
     """
     document = toml_document(text)
-    engine = document.pop(TABLE, None)
-    if not isinstance(engine, dict):
+    settings = document.pop(TABLE, None)
+    if not isinstance(settings, dict):
         return None
     former = mechanism_of_former(document)
     rig = MechanismRig.of_document(document if former is None else translated(document, former), former)
@@ -311,13 +311,13 @@ def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismB
     else:
         rig = replace(rig, model=asked_for(model))
     try:
-        if engine.pop("form", "") == "strong":
+        if settings.pop("form", "") == "strong":
             from pvid.board.strong_board import StrongBoard
 
-            return StrongBoard.of_tables(rig, engine)
-        return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)
+            return StrongBoard.of_tables(rig, settings)
+        return BOARDS[settings.pop("core", FLOAT.name)].of_tables(rig, settings)
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
+        raise PvidError(f"the settings of the identifier in the log are damaged: {error}") from error
 
 
 # ---- the text of the settings
@@ -339,8 +339,8 @@ def _flat(config: WeakConfig, refine: RefineConfig | None) -> dict[str, Any]:
     return {name: value for name, value in found.items() if value is not None}
 
 
-def _refine(engine: Mapping[str, Any]) -> RefineConfig | None:
-    given = part_of(engine, "refine")
+def _refine(settings: Mapping[str, Any]) -> RefineConfig | None:
+    given = part_of(settings, "refine")
     if not given:
         return None
     signal = tuple(
@@ -353,9 +353,9 @@ def _refine(engine: Mapping[str, Any]) -> RefineConfig | None:
     return RefineConfig(**{"second": None, **arrays}, signal=signal)
 
 
-def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> WeakConfig:
+def _config(compiled: CompiledModel, settings: Mapping[str, Any]) -> WeakConfig:
     def part(name: str) -> dict[str, Any]:
-        return part_of(engine, name)
+        return part_of(settings, name)
 
     def arrays(values: dict[str, Any]) -> dict[str, Any]:
         return {
@@ -372,7 +372,7 @@ def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> WeakConfig:
         model=weak_model_of(compiled), filter=filters, compensator=compensators, noise=noise, **arrays(design)
     )
     estimator = arrays(part("estimator"))
-    own = {one.name: engine[one.name] for one in fields(WeakConfig) if one.name in engine}
+    own = {one.name: settings[one.name] for one in fields(WeakConfig) if one.name in settings}
     return WeakConfig(
         **arrays(own),
         design=made,

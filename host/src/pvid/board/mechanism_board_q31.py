@@ -1,4 +1,4 @@
-"""A board that identifies a mechanism by the weak engine in fixed point; as mechanism_board."""
+"""A board that identifies a mechanism by the weak form in fixed point; as mechanism_board."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.board.settings_text import TABLE
 from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31
-from pvid.codegen.weak_q31 import FixedEngine, JetReaches, fixed_weak
+from pvid.codegen.weak_q31 import JetReaches, WeakQ31, fixed_weak
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.weak import neglected_part
 from pvid.configuration.weak_q31 import (
-    engine_for_recording,
-    engine_for_simulated_rig,
-    engine_of_parts,
-    engine_to_identify,
-    fixed_engine,
+    weak_q31_for_recording,
+    weak_q31_for_run,
+    weak_q31_for_simulated_rig,
+    weak_q31_of_parts,
+    weak_q31_to_identify,
     with_neglected,
 )
 from pvid.core.native import Native
@@ -57,14 +58,14 @@ class MechanismBoardQ31:
     Attributes
     ----------
     rig : of the mechanism
-    engine : functions, settings and tables
+    weak : functions, settings and tables
     recording : what the board's sensors count, int32 [ticks, samples]; empty as of MechanismBoard
     """
 
     configure_frame = ConfigureQ31
     matrix = "correlation"  # of an estimate
     rig: MechanismRig
-    engine: FixedEngine
+    weak: WeakQ31
     recording: npt.NDArray[np.int32]
 
     @classmethod
@@ -75,8 +76,8 @@ class MechanismBoardQ31:
         recording.refuse_damaged()
         whole = recording.whole()
         compiled = with_edges(rig.compiled(), whole.signals, whole.sample_rate)
-        engine = (engine_to_identify if to_identify else engine_for_recording)(compiled, whole, ranking=ranking)
-        return cls(rig, engine, engine.counts_of(whole.signals))
+        weak = (weak_q31_to_identify if to_identify else weak_q31_for_recording)(compiled, whole, ranking=ranking)
+        return cls(rig, weak, weak.counts_of(whole.signals))
 
     @classmethod
     def of_shipped_rig(cls, name: str) -> MechanismBoardQ31:
@@ -84,36 +85,36 @@ class MechanismBoardQ31:
         simulated = simulated_rig(name)
         rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
         compiled = rig.compiled()
-        engine = engine_for_simulated_rig(compiled)
-        return cls(rig, engine, engine.counts_of(RigSimulation.of(compiled, simulated).run()))
+        weak = weak_q31_for_simulated_rig(compiled)
+        return cls(rig, weak, weak.counts_of(RigSimulation.of(compiled, simulated).run()))
 
     @classmethod
     def of_guess(cls, rig: MechanismRig) -> MechanismBoardQ31:
         """As MechanismBoard.of_guess."""
         made = nominal_run(rig)
         run = made.recording.signals
-        engine = fixed_engine(made.compiled, run, made.chosen.design, made.p)
-        engine = with_neglected(engine, neglected_part(made.compiled, run))
-        return cls(rig, engine, engine.counts_of(run)[:MOST_TICKS])
+        weak = weak_q31_for_run(made.compiled, run, made.chosen.design, made.p)
+        weak = with_neglected(weak, neglected_part(made.compiled, run))
+        return cls(rig, weak, weak.counts_of(run)[:MOST_TICKS])
 
     def __post_init__(self) -> None:
-        refuse_slow(self.engine.sample_rate)
+        refuse_slow(self.weak.sample_rate)
 
     @property
     def config(self) -> WeakConfigQ31:
         """Settings and tables."""
-        return self.engine.config
+        return self.weak.config
 
     @property
     def names(self) -> BoardNames:
         """What the board says about itself."""
-        compiled = self.engine.compiled
+        compiled = self.weak.compiled
         units = {one.name: one.unit for one in compiled.signals}
         return BoardNames(
-            self.engine.name,
-            tuple(Quantity(name, units[name]) for name in self.engine.sample_names),
+            self.weak.name,
+            tuple(Quantity(name, units[name]) for name in self.weak.sample_names),
             tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
-            self.engine.lsb,
+            self.weak.lsb,
         )
 
     @property
@@ -124,7 +125,7 @@ class MechanismBoardQ31:
     @property
     def sample_rate(self) -> float:
         """Ticks a second."""
-        return self.engine.sample_rate
+        return self.weak.sample_rate
 
     @property
     def without_recording(self) -> MechanismBoardQ31:
@@ -140,17 +141,17 @@ class MechanismBoardQ31:
         return Count.of_values(*readings.T)
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
-        """Running hash after every tick in the engine on this machine [ticks]."""
-        identifier = weak_native_q31(self.engine.made, self.engine.parameters, self.engine.config).identifier()
+        """Running hash after every tick in the identifier on this machine [ticks]."""
+        identifier = weak_native_q31(self.weak.made, self.weak.parameters, self.weak.config).identifier()
         return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     @property
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
-        engine, name, sizes = self.engine, self.engine.name, files_weak_q31.sizes_of(self.engine)
+        weak, name, sizes = self.weak, self.weak.name, files_weak_q31.sizes_of(self.weak)
         code = {
-            f"{name}_weak_q31.h": files_weak_q31.header(engine.made, sizes, _COMMAND),
-            f"{name}_weak_q31.c": files_weak_q31.source(engine.made, engine.parameters, _COMMAND),
+            f"{name}_weak_q31.h": files_weak_q31.header(weak.made, sizes, _COMMAND),
+            f"{name}_weak_q31.c": files_weak_q31.source(weak.made, weak.parameters, _COMMAND),
             "stream_tables.h": files_weak_q31.design_header(self.config, name, sizes, _COMMAND, []),
         }
         return StreamImage.made(
@@ -159,7 +160,7 @@ class MechanismBoardQ31:
             own=[f"#define STREAM_CONFIG {name}_config_q31"],
             names=self.names,
             sample_rate=self.sample_rate,
-            units=[float_literal(np.float32(2.0**-bits)) for bits in engine.parameters.p_bits],
+            units=[float_literal(np.float32(2.0**-bits)) for bits in weak.parameters.p_bits],
             code=code,
             recording=_recording(self.recording),
             sizes=sizes,
@@ -204,38 +205,38 @@ class MechanismBoardQ31:
 
     def twin_of(self, frame: Configuration) -> PrintedTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
-        sources = weak_sources_q31(self.engine.made, self.engine.parameters, self.config)
+        sources = weak_sources_q31(self.weak.made, self.weak.parameters, self.config)
         return PrintedTwin(sources, self.configured(frame))
 
     def core_of(self, frame: Configuration) -> WeakIdentifierQ31:
         """The core, compiled on this machine, with the values of a Configure frame; raises as `configured`, and where
         there is no compiler."""
-        library = weak_native_q31(self.engine.made, self.engine.parameters, self.config)
+        library = weak_native_q31(self.weak.made, self.weak.parameters, self.config)
         return library.identifier(estimator=self.configured(frame).estimator)
 
     def text(self) -> str:
-        """The rig file with the engine's settings, for a log; `of_tables` gives the same board back."""
-        lines = [f"{name} = {_written(value)}" for name, value in _flat(self.engine).items()]
-        return "\n".join([self.rig.text(), "[engine]", *lines, ""])
+        """The rig file with the identifier's settings, for a log; `of_tables` gives the same board back."""
+        lines = [f"{name} = {_written(value)}" for name, value in _flat(self.weak).items()]
+        return "\n".join([self.rig.text(), f"[{TABLE}]", *lines, ""])
 
     @classmethod
-    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoardQ31:
-        """From the rig and the table `engine` of the text of a log.
+    def of_tables(cls, rig: MechanismRig, weak: Mapping[str, Any]) -> MechanismBoardQ31:
+        """From the rig and the table of settings in the text of a log.
 
         Raises
         ------
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
-        for value in engine.values():
+        for value in weak.values():
             _refuse_words(value)
         compiled = rig.compiled()
         functions = weak_functions_of(compiled)
-        of_jets = dict(zip(functions.jet_names, map(float, engine["jet_reach"]), strict=True))
-        made = fixed_weak(functions, JetReaches(run_s=float(engine["run_s"]), of=of_jets))
+        of_jets = dict(zip(functions.jet_names, map(float, weak["jet_reach"]), strict=True))
+        made = fixed_weak(functions, JetReaches(run_s=float(weak["run_s"]), of=of_jets))
 
         def part(name: str) -> dict[str, Any]:
-            keys = {key: value for key, value in engine.items() if key.startswith(f"{name}_")}
+            keys = {key: value for key, value in weak.items() if key.startswith(f"{name}_")}
             return {key.removeprefix(f"{name}_"): _tuples(value) for key, value in keys.items()}
 
         design = part("design")
@@ -250,12 +251,12 @@ class MechanismBoardQ31:
             trust=TrustConfigQ31(**part("trust")),
             gate=GateConfigQ31(**part("gate")),
             **{
-                one.name: _tuples(engine[one.name])
+                one.name: _tuples(weak[one.name])
                 for one in fields(WeakConfigQ31)
-                if one.name in engine and one.name not in ("design", "estimator", "trust", "gate")
+                if one.name in weak and one.name not in ("design", "estimator", "trust", "gate")
             },
         )
-        own = engine_of_parts(compiled, made, config, float(engine["sample_rate"]))
+        own = weak_q31_of_parts(compiled, made, config, float(weak["sample_rate"]))
         return cls(rig, own, np.zeros((0, tables.model.samples), np.int32))
 
 
@@ -282,8 +283,8 @@ def _recording(counts: npt.NDArray[np.int32]) -> str:
 # ---- the text of the settings: integers, and two reaches that the formats follow from
 
 
-def _flat(engine: FixedEngine) -> dict[str, Any]:
-    config = engine.config
+def _flat(weak: WeakQ31) -> dict[str, Any]:
+    config = weak.config
     parts: dict[str, Any] = {
         "estimator": config.estimator,
         "trust": config.trust,
@@ -292,9 +293,9 @@ def _flat(engine: FixedEngine) -> dict[str, Any]:
     }
     found: dict[str, Any] = {
         "core": "q31",
-        "sample_rate": engine.sample_rate,
-        "run_s": engine.made.run_s,
-        "jet_reach": engine.made.reaches,
+        "sample_rate": weak.sample_rate,
+        "run_s": weak.made.run_s,
+        "jet_reach": weak.made.reaches,
     }
     found |= {one.name: getattr(config, one.name) for one in fields(config) if one.name not in parts}
     for part, owner in parts.items():

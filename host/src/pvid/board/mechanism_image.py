@@ -1,4 +1,4 @@
-"""The replay image of a described mechanism: its generated weak form, the engine and a run of its simulated rig."""
+"""The replay image of a described mechanism: its generated weak form, the identifier and a run of its simulated rig."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class MechanismRun:
     Attributes
     ----------
     compiled : the mechanism
-    config : of the float engine
+    config : of the float identifier
     counts : int32 [ticks, samples]; a sample is float32(count) * lsb, rounded once, on the board and here
     lsb : float32 [samples]
     measure_from : first tick that counts in the mean cost of a tick; PERIODS half windows follow, or LONG_PERIODS

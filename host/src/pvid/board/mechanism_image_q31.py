@@ -1,4 +1,4 @@
-"""The replay image of a described mechanism in fixed point: its weak form, the engine and a run of its rig."""
+"""The replay image of a described mechanism in fixed point: its weak form, the identifier and a run of its rig."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from pvid.board.mechanism_image import PERIODS, build_with, long_run, measured_f
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31
-from pvid.codegen.weak_q31 import FixedEngine
+from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.weak import simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.models import mechanisms
 from pvid.twin.printed import PrintedTwin
 
@@ -30,24 +30,24 @@ class FixedRun:
 
     Attributes
     ----------
-    engine : settings and tables
+    weak : settings and tables
     counts : int32 [ticks, samples]
     measure_from : as in MechanismRun
     """
 
-    engine: FixedEngine
+    weak: WeakQ31
     counts: npt.NDArray[np.int32]
     measure_from: int
 
     @property
     def name(self) -> str:
         """Of the mechanism, in C."""
-        return self.engine.name
+        return self.weak.name
 
     def shortened(self, ticks: int) -> FixedRun:
         """Its first ticks."""
-        design = self.engine.config.design
-        start = measured_from(self.engine.ticks_needed, design.hop * design.decimation, ticks)
+        design = self.weak.config.design
+        start = measured_from(self.weak.ticks_needed, design.hop * design.decimation, ticks)
         return replace(self, counts=self.counts[:ticks], measure_from=start)
 
     @property
@@ -58,7 +58,7 @@ class FixedRun:
     @property
     def sizes(self) -> dict[str, int]:
         """Of the core's arrays."""
-        return files_weak_q31.fitted_of(self.engine)
+        return files_weak_q31.fitted_of(self.weak)
 
 
 @cache
@@ -71,29 +71,29 @@ def fixed_run(name: str, ticks: int | None = None, *, long: bool = False) -> Fix
         Where there is no such mechanism, or its rig's run is shorter.
     """
     compiled = mechanisms.compiled_of(name)
-    engine = engine_for_simulated_rig(compiled)
-    period = engine.config.design.hop * engine.config.design.decimation
-    counts = engine.counts_of(simulated_run_of(compiled)[0])
-    wanted = engine.ticks_needed + PERIODS * period if ticks is None else ticks
+    weak = weak_q31_for_simulated_rig(compiled)
+    period = weak.config.design.hop * weak.config.design.decimation
+    counts = weak.counts_of(simulated_run_of(compiled)[0])
+    wanted = weak.ticks_needed + PERIODS * period if ticks is None else ticks
     if long:
-        wanted = long_run(engine.ticks_needed, period, len(counts))
+        wanted = long_run(weak.ticks_needed, period, len(counts))
     if len(counts) < wanted:
         raise PvidError(f"the run of {name} has {len(counts)} samples, too few for {wanted}")
-    return FixedRun(engine, counts, 0).shortened(wanted)
+    return FixedRun(weak, counts, 0).shortened(wanted)
 
 
 def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
-    engine = run.engine
-    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    weak = run.weak
+    identifier = weak_native_q31(weak.made, weak.parameters, weak.config).identifier()
     return identifier.run_samples(run.counts).hash
 
 
 def twin_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]."""
-    engine = run.engine
-    sources = weak_sources_q31(engine.made, engine.parameters, engine.config)
-    return PrintedTwin(sources, engine.config).run(run.counts).hash
+    weak = run.weak
+    sources = weak_sources_q31(weak.made, weak.parameters, weak.config)
+    return PrintedTwin(sources, weak.config).run(run.counts).hash
 
 
 def header(run: FixedRun) -> str:
@@ -141,7 +141,7 @@ def header(run: FixedRun) -> str:
 
 def files_of(run: FixedRun) -> dict[str, str]:
     """What the image consists of besides the core: name -> text."""
-    return files_weak_q31.files_of(run.engine, MADE_BY) | {"replay_run.h": header(run)}
+    return files_weak_q31.files_of(run.weak, MADE_BY) | {"replay_run.h": header(run)}
 
 
 def build_fixed_image(target: Board, run: FixedRun) -> tuple[Path, Path]:

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
-from pvid.board.engine_image import engine_image
 from pvid.board.refined_image import build_refined_image
 from pvid.board.replay_image import parse_report
 from pvid.board.sizes import STANDARD, refined_replay
 from pvid.board.strong_image import build_image, measured_from, standard_run
+from pvid.board.weak_image import weak_image
 from pvid.core.sources import ROOT
 from pvid.settings.enums import Core, Form
 from pvid.settings.forms import FORMS
@@ -116,7 +116,7 @@ def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
 
 
 def _weak(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
-    made = engine_image(board, model, core)
+    made = weak_image(board, model, core)
     return made.image, f"pvid_weak_step_{core}", made.measure_from
 
 

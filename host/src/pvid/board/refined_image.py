@@ -1,4 +1,4 @@
-"""The replay image of a mechanism with both stages: weak engine and refinement."""
+"""The replay image of a mechanism with both stages: weak identifier and refinement."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from pvid.settings.refine import RefineSignal
 from pvid.settings.weak import WeakFilter, WeakNoise
 
-TABLE = "engine"  # of the text
+TABLE = "engine"  # of the text: the name in all logs that there are
 _SHORT, _WORDS = 16, 12  # numbers that are written as such; words in a line
 
 
@@ -50,6 +50,6 @@ def array_of(value: Any, kind: type[np.generic] = np.float32) -> npt.NDArray[Any
     return np.array(value, kind)
 
 
-def part_of(engine: Mapping[str, Any], name: str) -> dict[str, Any]:
+def part_of(settings: Mapping[str, Any], name: str) -> dict[str, Any]:
     """The keys of a part without its name."""
-    return {key.removeprefix(f"{name}_"): value for key, value in engine.items() if key.startswith(f"{name}_")}
+    return {key.removeprefix(f"{name}_"): value for key, value in settings.items() if key.startswith(f"{name}_")}

@@ -12,11 +12,11 @@ from pathlib import Path
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
-from pvid.board.engine_image import engine_image
 from pvid.board.refined_image import RefinedRun, build_refined_image, published_run
 from pvid.board.replay_image import ReplayReport, play
 from pvid.board.stack_bound import stack_bound
 from pvid.board.strong_image import build_image, standard_run
+from pvid.board.weak_image import weak_image
 from pvid.settings.cores import CORES
 from pvid.settings.forms import FORMS
 
@@ -152,12 +152,12 @@ def _strong(configuration: Configuration) -> BuiltImage:
 
 def _weak(configuration: Configuration) -> BuiltImage:
     """Of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
-    made = engine_image(configuration.board, configuration.model, CORES[configuration.core].name)
-    return built_engine(made.image, made.tree, made.name)
+    made = weak_image(configuration.board, configuration.model, CORES[configuration.core].name)
+    return built_weak(made.image, made.tree, made.name)
 
 
-def built_engine(image: Path, tree: Path, name: str) -> BuiltImage:
-    """An image of the weak engine with the mechanism called `name` in C."""
+def built_weak(image: Path, tree: Path, name: str) -> BuiltImage:
+    """An image of the weak identifier with the mechanism called `name` in C."""
     tables = rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.({name}_|replay_refine_config)"
     return BuiltImage(
         image,
@@ -176,7 +176,7 @@ def refined_replay(board: Board) -> RefinedRun:
 
 def _refined(configuration: Configuration) -> BuiltImage:
     run = refined_replay(configuration.board)
-    return built_engine(*build_refined_image(configuration.board, run), run.weak.name)
+    return built_weak(*build_refined_image(configuration.board, run), run.weak.name)
 
 
 _BUILT: dict[str, Callable[[Configuration], BuiltImage]] = {

@@ -140,8 +140,8 @@ class StrongBoard(FloatBoard):
         return "\n".join([self.rig.text(), f"[{TABLE}]", 'form = "strong"', *lines, ""])
 
     @classmethod
-    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> StrongBoard:
-        """From the rig and the table `engine` of the text of a log.
+    def of_tables(cls, rig: MechanismRig, settings: Mapping[str, Any]) -> StrongBoard:
+        """From the rig and the table of settings in the text of a log.
 
         Raises
         ------
@@ -150,14 +150,14 @@ class StrongBoard(FloatBoard):
         """
         compiled = rig.compiled()
         strong = renamed(strong_functions_of(strong_form(compiled)))
-        own = {name: engine[name] for name in _OWN}
-        given = part_of(engine, "estimator")
+        own = {name: settings[name] for name in _OWN}
+        given = part_of(settings, "estimator")
         arrays: dict[str, Any] = {
             name: array_of(value) if isinstance(value, list) else value for name, value in given.items()
         }
         config = StrongModelConfig(
             **{**own, "row_sd": tuple(own["row_sd"]), "weights": array_of(own["weights"]).reshape(5, -1)},
             estimator=EstimatorConfig(**{**arrays, "law": Law(given["law"])}),
-            gate=GateConfig(**part_of(engine, "gate")),
+            gate=GateConfig(**part_of(settings, "gate")),
         )
         return cls(rig, compiled, config, np.zeros((0, len(strong.signals)), np.float32), strong)

@@ -68,7 +68,7 @@ def header(design: StrongDesign | StrongDesignQ31) -> str:
         own = ["#define REPLAY_HAS_BITS", "#define REPLAY_FAULTS pvid_arithmetic_faults_f32()"]
         hashed = f"{name}_fnv_f32"
     else:
-        name, window, samples = design.engine.name, design.engine.config.window, design.counts
+        name, window, samples = design.strong_q31.name, design.strong_q31.config.window, design.counts
         core, sample, count = "q31", "int32_t", "int32_t"
         includes, own, hashed = ['#include "pvid/fnv_q31.h"'], ["#define REPLAY_FAULTS 0u"], "pvid_fnv_estimator_q31"
     ticks, signals = samples.shape
@@ -143,8 +143,8 @@ def build_image(board: Board, design: StrongDesign | StrongDesignQ31) -> tuple[P
         }
         sizes = sizes_of_strong(design.strong, design.config)
     else:
-        name, ticks, core = design.engine.name, len(design.counts), STRONG_FIXED.name
-        files, sizes = files_strong_q31.files_of(design.engine, MADE_BY), design.engine.sizes
+        name, ticks, core = design.strong_q31.name, len(design.counts), STRONG_FIXED.name
+        files, sizes = files_strong_q31.files_of(design.strong_q31, MADE_BY), design.strong_q31.sizes
     return build_with(
         board, f"{name}-{core}-{ticks}", files | {"replay_run.h": header(design)}, sizes, core, STRONG.room
     )

@@ -8,8 +8,8 @@ from pathlib import Path
 from pvid.base.console import progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.board.compare_on import Outcome
-from pvid.board.engine_board import verify_recording
 from pvid.board.strong_image import compare_on_board
+from pvid.board.verify_board import verify_recording
 from pvid.cli.identify_run import IN_C, LAWS, STRONG_FORM, recording_of
 from pvid.compare.bits import Comparison
 from pvid.compare.strong import StrongComparison

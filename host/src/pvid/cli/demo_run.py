@@ -16,8 +16,8 @@ from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import percent, with_prefix
 from pvid.board.design_cost import Asked, Cost, CostedDesign
-from pvid.board.engine_board import verify_recording
 from pvid.board.target import HOST_TARGET, Verdict
+from pvid.board.verify_board import verify_recording
 from pvid.compare.bits import Comparison
 from pvid.compare.weak import compare_recording
 from pvid.identification.analysis import analysed

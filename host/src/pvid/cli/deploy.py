@@ -84,7 +84,7 @@ def _deployment(
 ) -> Deployment:
     from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
     from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
-    from pvid.configuration.weak_q31 import engine_for_recording, engine_for_rig_like_the_shipped
+    from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_rig_like_the_shipped
     from pvid.deploy.of_rig import deployment_f32, deployment_q31
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.oracle.weak.edges import with_edges
@@ -96,7 +96,7 @@ def _deployment(
         recording = recorded(compiled, rig, run_path, columns)
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
         if is_integer:
-            return deployment_q31(engine_for_recording(compiled, recording, functions), recording.signals, title)
+            return deployment_q31(weak_q31_for_recording(compiled, recording, functions), recording.signals, title)
         config = config_for_recording(compiled, recording, functions)
         refine = _noted(lambda: refine_design(compiled, config, recording.signals))
         return deployment_f32(compiled, config, recording.signals, title, refine)
@@ -104,7 +104,7 @@ def _deployment(
         raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
     run = simulated_run_of(compiled)[0]
     if is_integer:
-        return deployment_q31(engine_for_rig_like_the_shipped(compiled, functions), run, title)
+        return deployment_q31(weak_q31_for_rig_like_the_shipped(compiled, functions), run, title)
     config = config_for_rig_like_the_shipped(compiled, functions)
     refine = _noted(lambda: refine_for_simulated_rig(compiled, config))
     return deployment_f32(compiled, config, full_motion_of(compiled), title, refine)

@@ -15,7 +15,7 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
-from pvid.configuration.design_report import EngineReport, designs_tried, report_for_recording, report_for_rig
+from pvid.configuration.design_report import DesignReport, designs_tried, report_for_recording, report_for_rig
 from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
@@ -32,7 +32,7 @@ _SHOWN = 12  # designs of a table
 def print_design(
     model: CompiledModel, recording: Recording | None, asked: Asked | None = None, *, as_json: bool
 ) -> int:
-    """The engine's design for a recording, or for the simulated rig, its predicted errors, and its cost on a board.
+    """The identifier's design for a recording, or for the simulated rig, its predicted errors, and its cost on a board.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def _stages(refine: RefineConfig | None) -> str:
     return "weak form" if refine is None else f"both, jobs {refine.jobs}, rests {refine.rests}"
 
 
-def _print_report(report: EngineReport) -> None:
+def _print_report(report: DesignReport) -> None:
     table = Table("parameter", "predicted at", "standard error", title=f"a run of {report.duration:g} s")
     for one, value, error in zip(report.model.unknowns, report.chosen.p, report.chosen.error, strict=True):
         table.add_row(
@@ -137,7 +137,7 @@ def _print_report(report: EngineReport) -> None:
 
 
 def print_tuning(model: CompiledModel, recording: Recording, reference: Analysis | None = None) -> int:
-    """The designs that were tried on a recording, the best first, and the engine's own.
+    """The designs that were tried on a recording, the best first, and the identifier's own.
 
     Parameters
     ----------
@@ -147,20 +147,20 @@ def print_tuning(model: CompiledModel, recording: Recording, reference: Analysis
     -------
     The exit code.
     """
-    tried, engine = designs_tried(model, recording)
+    tried, for_core = designs_tried(model, recording)
     table = Table(title=f"{model.title}: predicted errors, the geometric mean over the parameters")
     headings = ("", "window s", "functions", "decimation", "derivatives ms", "expected error %", "chi2")
     for heading in headings if reference is None else (*headings, "distance / error"):
         table.add_column(heading, justify="right")
     for place, one in enumerate(tried[:_SHOWN]):
         table.add_row("analysis" if place == 0 else "", *_cells(one), *_distance(model, one, reference))
-    table.add_row("C core", *_cells(engine), *_distance(model, engine, reference))
+    table.add_row("C core", *_cells(for_core), *_distance(model, for_core, reference))
     Console(width=None if sys.stdout.isatty() else 120).print(table)
     click.echo(
         f"{len(tried)} designs tried; identify chooses these by itself, model build {model.name} --run prints the C "
         "core's tables"
     )
-    return DONE if engine.known else NOTHING_IDENTIFIED
+    return DONE if for_core.known else NOTHING_IDENTIFIED
 
 
 def _distance(model: CompiledModel, one: Scored, reference: Analysis | None) -> tuple[str, ...]:

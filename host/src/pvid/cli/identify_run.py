@@ -230,7 +230,7 @@ def plot_run(path: Path, rig: MechanismRig, columns: str | None, figure: Path, *
 
 def _streamed(target: str, rig: MechanismRig, recording: Recording, core: Core, refined: bool) -> bool:
     """Streams a recording to a target and prints the account; whether every hash is that of this machine."""
-    from pvid.board.engine_board import verify_recording
+    from pvid.board.verify_board import verify_recording
 
     with progress_bar(f"streaming to {target}", len(recording)) as advance:
         verdict = verify_recording(target, rig, recording, core, advance, refined=refined)

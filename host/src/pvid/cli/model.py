@@ -18,8 +18,8 @@ from pvid.cli.rig_design import model_of_rig, recorded
 from pvid.cli.simulate import ABOVE_0, numbers, of_model, start_option
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
-    from pvid.codegen.strong_q31 import FixedStrongEngine
-    from pvid.codegen.weak_q31 import FixedEngine
+    from pvid.codegen.strong_q31 import StrongQ31
+    from pvid.codegen.weak_q31 import WeakQ31
     from pvid.model.compiled import CompiledModel
     from pvid.rig.run import Recording
     from pvid.settings.refine import RefineConfig
@@ -212,11 +212,11 @@ def build(
     whole = GeneratedModel(compiled, title, options)
     no_fixed_weak = no_fixed_strong = None
     if design is not None:
-        engine, no_fixed_weak = _fixed_engine(compiled, recording, functions, soft)
-        options = replace(options, design=design, fixed_engine=engine)
+        weak, no_fixed_weak = _weak_q31(compiled, recording, functions, soft)
+        options = replace(options, design=design, weak_q31_for_run=weak)
     if strong:
-        strong_design, strong_engine, no_fixed_strong = _strong_design_of(compiled, model, recording)
-        options = replace(options, strong_design=strong_design, strong_engine=strong_engine)
+        strong_design, strong_q31, no_fixed_strong = _strong_design_of(compiled, model, recording)
+        options = replace(options, strong_design=strong_design, strong_q31=strong_q31)
     no_refinement = whole.refinement.refusal
     if design is not None and no_refinement is None:
         refine_design, no_refinement = _refine_design_of(compiled, recording, design, soft)
@@ -249,7 +249,7 @@ def build(
 
 def _strong_design_of(
     compiled: CompiledModel, model: str, recording: Recording | None
-) -> tuple[StrongModelConfig | None, FixedStrongEngine | None, str | None]:
+) -> tuple[StrongModelConfig | None, StrongQ31 | None, str | None]:
     """Of the strong form for the rig of a recording, or for the shipped rig of a shipped mechanism; the same in fixed
     point, or why there is none."""
     from pvid.configuration.strong import strong_design
@@ -267,7 +267,7 @@ def _strong_design_of(
         recording = Recording(run["t"], signals, simulation.rig.sample_rate)
     design = strong_design(compiled, recording)
     try:
-        return design.config, fixed_design(compiled, recording, design).engine, None
+        return design.config, fixed_design(compiled, recording, design).strong_q31, None
     except PvidError as error:
         return design.config, None, str(error)
 
@@ -310,15 +310,15 @@ def _design_of(
     return None
 
 
-def _fixed_engine(
+def _weak_q31(
     compiled: CompiledModel, recording: Recording | None, functions: int | None, soft_signs: dict[str, float]
-) -> tuple[FixedEngine | None, str | None]:
+) -> tuple[WeakQ31 | None, str | None]:
     """The fixed-point weak form for the rig, or why there is none."""
-    from pvid.configuration.weak_q31 import engine_for_recording, engine_for_rig_like_the_shipped
+    from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_rig_like_the_shipped
 
     try:
         if recording is None:
-            return engine_for_rig_like_the_shipped(compiled, functions, soft_signs), None
-        return engine_for_recording(compiled, recording, functions, soft_signs), None
+            return weak_q31_for_rig_like_the_shipped(compiled, functions, soft_signs), None
+        return weak_q31_for_recording(compiled, recording, functions, soft_signs), None
     except PvidError as error:
         return None, str(error)

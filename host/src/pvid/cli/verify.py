@@ -12,20 +12,20 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar
 from pvid.cli.input import log_argument, log_rig
 from pvid.link.frames import Core, Form
 from pvid.log.reader import LogReader
-from pvid.log.rig import engine_text_of_log, hello_of_log
+from pvid.log.rig import hello_of_log, settings_text_of_log
 from pvid.log.rig_choice import rig_of
 
 if TYPE_CHECKING:
-    from pvid.log.verify import EngineBoard
+    from pvid.log.verify import ReplayableBoard
 
 _MOST_STRETCHES = 100  # that are printed
 
 
-def _board_of(log: Path, rig_path: Path | None, model: str | None) -> EngineBoard | None:
+def _board_of(log: Path, rig_path: Path | None, model: str | None) -> ReplayableBoard | None:
     """The board, whose settings are in the log or follow from the rig file; None: there is neither."""
     from pvid.board.mechanism_board import board_of, board_of_guess  # loads SymPy
 
-    text = None if rig_path is not None else engine_text_of_log(log)
+    text = None if rig_path is not None else settings_text_of_log(log)
     if text is not None:
         return board_of(text, model)
     hello = hello_of_log(log)

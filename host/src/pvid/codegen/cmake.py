@@ -91,7 +91,7 @@ def printed(model: GeneratedModel) -> dict[str, str]:
         options=COMPILE_OPTIONS,
         banner="\n# ".join(banner(model.functions, model.command)),
         sources=" ".join(f"{model.name}_{core}.c" for core in cores),
-        fixed_weak=_CMAKE_Q31.format(**words) if model.options.fixed_engine is not None else "",
+        fixed_weak=_CMAKE_Q31.format(**words) if model.options.weak_q31_for_run is not None else "",
         **words,
     )
     return {"CMakeLists.txt": text}

@@ -10,7 +10,7 @@ from pvid.codegen.c_text import banner, c_comment, for_cpp, guarded, initialised
 from pvid.codegen.files_weak import size_check
 from pvid.codegen.files_weak_q31 import fields_of, numbers, parameters_in_c, structs
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.strong_q31 import FixedStrong, FixedStrongEngine
+from pvid.codegen.strong_q31 import FixedStrong, StrongQ31
 from pvid.core.sizes import smallest
 from pvid.settings.weak_q31 import Rescale
 
@@ -76,28 +76,28 @@ void {name}_freeze_q31({name}_q31 *self, bool frozen);"""
 
 def printed(model: GeneratedModel) -> dict[str, str]:
     """NAME_strong_q31.h and .c, NAME_strong_design_q31.h, where there is a rig."""
-    engine = model.options.strong_engine
-    return {} if engine is None else files_of(engine, model.command)
+    strong_q31 = model.options.strong_q31
+    return {} if strong_q31 is None else files_of(strong_q31, model.command)
 
 
-def files_of(engine: FixedStrongEngine, command: str) -> dict[str, str]:
-    """The same of an engine.
+def files_of(strong_q31: StrongQ31, command: str) -> dict[str, str]:
+    """The same of an identifier.
 
     Parameters
     ----------
     command : that makes them; no date, so that the same command makes the same files
     """
-    name = engine.name
+    name = strong_q31.name
     return {
-        f"{name}_q31.h": header(engine, command),
-        f"{name}_q31.c": source(engine, command),
-        f"{name}_design_q31.h": design_header(engine, command),
+        f"{name}_q31.h": header(strong_q31, command),
+        f"{name}_q31.c": source(strong_q31, command),
+        f"{name}_design_q31.h": design_header(strong_q31, command),
     }
 
 
-def header(engine: FixedStrongEngine, command: str) -> str:
+def header(strong_q31: StrongQ31, command: str) -> str:
     """NAME_strong_q31.h."""
-    made = engine.made
+    made = strong_q31.made
     strong, functions = made.strong, made.strong.functions
     name, upper = made.name, made.name.upper()
     readings = [
@@ -145,16 +145,16 @@ def header(engine: FixedStrongEngine, command: str) -> str:
         '#include "pvid/gate_q31.h"',
         '#include "pvid/misfit_q31.h"',
         "",
-        *size_check({macro: size for macro, size in engine.sizes.items() if macro != "PVID_MAX_WINDOW"}),
+        *size_check({macro: size for macro, size in strong_q31.sizes.items() if macro != "PVID_MAX_WINDOW"}),
         "",
         *for_cpp([*(f"#define {upper}_{what} {count}" for what, count in counts.items()), "", text, ""]),
     ]
     return guarded(f"{name}_q31", about, body)
 
 
-def source(engine: FixedStrongEngine, command: str) -> str:
+def source(strong_q31: StrongQ31, command: str) -> str:
     """NAME_strong_q31.c."""
-    made, config = engine.made, engine.config
+    made, config = strong_q31.made, strong_q31.config
     strong, name = made.strong, made.name
     counted = ["SIGNALS", "CHANNELS", "INPUTS", "KINDS", "COLUMNS"]
     held = ", ".join("true" if one else "false" for one in (*strong.held, *[False] * len(strong.integrals)))
@@ -184,7 +184,7 @@ def source(engine: FixedStrongEngine, command: str) -> str:
             *_filters(made),
             "/* N, then Y, of each kind. False iff an input is beyond its reach. */\n"
             + c_functions.fixed_function(signature, made.row, made.limits),
-            *_integrals(engine),
+            *_integrals(strong_q31),
             parameters_in_c(made.parameters, name).rstrip(),
             '#include "strong/strong_q31.h"\n',
         ]
@@ -221,9 +221,9 @@ def _filters(made: FixedStrong) -> list[str]:
     ]
 
 
-def _integrals(engine: FixedStrongEngine) -> list[str]:
+def _integrals(strong_q31: StrongQ31) -> list[str]:
     """What strong/strong_q31.h integrates."""
-    made, config = engine.made, engine.config
+    made, config = strong_q31.made, strong_q31.config
     if made.integrands is None:
         return []
     places = sorted(config.raw.items())
@@ -241,9 +241,9 @@ def _integrals(engine: FixedStrongEngine) -> list[str]:
     ]
 
 
-def design_header(engine: FixedStrongEngine, command: str) -> str:
+def design_header(strong_q31: StrongQ31, command: str) -> str:
     """NAME_strong_design_q31.h: a configuration that is ready for init."""
-    config, made, name = engine.config, engine.made, engine.name
+    config, made, name = strong_q31.config, strong_q31.made, strong_q31.name
     model, own = made.strong.functions.model, config.estimator
     units = {one.name: one.unit or "1" for one in model.signals}
     about = [
@@ -260,7 +260,7 @@ def design_header(engine: FixedStrongEngine, command: str) -> str:
             [
                 (f"reading[{k}]", one.name, f"{lsb:.6g} {units[one.name]} a count,", f"within +-{full}")
                 for k, (one, lsb, full) in enumerate(
-                    zip(made.strong.signals, engine.lsb, config.full_scale, strict=True)
+                    zip(made.strong.signals, strong_q31.lsb, config.full_scale, strict=True)
                 )
             ]
         ),
@@ -271,15 +271,15 @@ def design_header(engine: FixedStrongEngine, command: str) -> str:
                 (
                     f"{one.name} [{one.unit or '1'}]",
                     f"= integer 2^-{bits},",
-                    f"start {engine.values(own.start)[k]:.6g},",
-                    f"{engine.values(own.lower)[k]:.6g} to {engine.values(own.upper)[k]:.6g}",
+                    f"start {strong_q31.values(own.start)[k]:.6g},",
+                    f"{strong_q31.values(own.lower)[k]:.6g} to {strong_q31.values(own.upper)[k]:.6g}",
                 )
                 for k, (one, bits) in enumerate(zip(model.unknowns, own.p_bits, strict=True))
             ]
         ),
         "",
         "The smallest sizes of the core that hold it, for little RAM:",
-        f"  {' '.join(f'-D{macro}={size}' for macro, size in smallest(engine.sizes).items())}",
+        f"  {' '.join(f'-D{macro}={size}' for macro, size in smallest(strong_q31.sizes).items())}",
     ]
     bank = {"half": config.half, "stride": config.stride, "centre": config.centre, "weights": f"{name}_weights_q31"}
     settings = {

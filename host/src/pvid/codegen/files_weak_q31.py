@@ -11,7 +11,7 @@ from pvid.codegen.c_text import banner, c_comment, for_cpp, guarded
 from pvid.codegen.files_weak import size_check
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.weak_q31 import FixedEngine, FixedWeak, ParametersQ31
+from pvid.codegen.weak_q31 import FixedWeak, ParametersQ31, WeakQ31
 from pvid.core.sizes import smallest
 from pvid.settings.parts import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak import NONE
@@ -23,38 +23,38 @@ _WIDTH = 12  # numbers a line
 
 def printed(model: GeneratedModel) -> dict[str, str]:
     """NAME_weak_q31.h and .c, NAME_design_q31.h and NAME_config_q31.h, where there is a rig."""
-    engine = model.options.fixed_engine
-    if engine is None:
+    weak = model.options.weak_q31_for_run
+    if weak is None:
         return {}
-    name = f"{engine.name}_config_q31"
-    return files_of(engine, model.command) | {f"{name}.h": config_header(name, fitted_of(engine), model.command)}
+    name = f"{weak.name}_config_q31"
+    return files_of(weak, model.command) | {f"{name}.h": config_header(name, fitted_of(weak), model.command)}
 
 
-def files_of(engine: FixedEngine, command: str) -> dict[str, str]:
+def files_of(weak: WeakQ31, command: str) -> dict[str, str]:
     """NAME_weak_q31.h and .c, NAME_design_q31.h.
 
     Parameters
     ----------
     command : that makes them; no date, so that the same command makes the same files
     """
-    sizes, name = sizes_of(engine), engine.name
+    sizes, name = sizes_of(weak), weak.name
     return {
-        f"{name}_weak_q31.h": header(engine.made, sizes, command),
-        f"{name}_weak_q31.c": source(engine.made, engine.parameters, command),
-        f"{name}_design_q31.h": design_header(engine.config, name, sizes, command, _about(engine)),
+        f"{name}_weak_q31.h": header(weak.made, sizes, command),
+        f"{name}_weak_q31.c": source(weak.made, weak.parameters, command),
+        f"{name}_design_q31.h": design_header(weak.config, name, sizes, command, _about(weak)),
     }
 
 
-def fitted_of(engine: FixedEngine) -> dict[str, int]:
+def fitted_of(weak: WeakQ31) -> dict[str, int]:
     """Sizes of the core for this design alone."""
-    model = engine.parameters.model
-    return fitted_sizes_q31(engine.config, model.n_p, len(model.c_row))
+    model = weak.parameters.model
+    return fitted_sizes_q31(weak.config, model.n_p, len(model.c_row))
 
 
-def sizes_of(engine: FixedEngine) -> dict[str, int]:
+def sizes_of(weak: WeakQ31) -> dict[str, int]:
     """Sizes of the core that hold this design."""
-    model = engine.parameters.model
-    return sizes_of_q31(engine.config.design, model.n_p, len(model.c_row))
+    model = weak.parameters.model
+    return sizes_of_q31(weak.config.design, model.n_p, len(model.c_row))
 
 
 def header(made: FixedWeak, needed: Mapping[str, int], command: str) -> str:
@@ -408,29 +408,29 @@ def parameters_in_c(made: ParametersQ31, prefix: str) -> str:
     return "\n\n".join([*generated, own])
 
 
-def _about(engine: FixedEngine) -> list[str]:
+def _about(weak: WeakQ31) -> list[str]:
     """The rig and the settings in words."""
-    design, own = engine.config.design, engine.config.estimator
-    compiled = engine.compiled
+    design, own = weak.config.design, weak.config.estimator
+    compiled = weak.compiled
     units = {one.name: one.unit or "1" for one in compiled.signals}
     readings = [
         (f"reading[{k}]", name, f"{lsb:.6g} {units[name]} a count,", f"within +-{full} of its offset")
-        for k, (name, lsb, full) in enumerate(zip(engine.sample_names, engine.lsb, design.full_scale, strict=True))
+        for k, (name, lsb, full) in enumerate(zip(weak.sample_names, weak.lsb, design.full_scale, strict=True))
     ]
     parameters = [
         (
             f"{one.name} [{one.unit or '1'}]",
             f"= integer 2^{-bits},",
-            f"start {engine.values(own.start)[k]:.6g},",
-            f"{engine.values(own.lower)[k]:.6g} to {engine.values(own.upper)[k]:.6g}",
+            f"start {weak.values(own.start)[k]:.6g},",
+            f"{weak.values(own.lower)[k]:.6g} to {weak.values(own.upper)[k]:.6g}",
         )
         for k, (one, bits) in enumerate(zip(compiled.unknowns, own.p_bits, strict=True))
     ]
-    first = f"at most {engine.ticks_needed} samples, {engine.ticks_needed / engine.sample_rate:.3g} s"
+    first = f"at most {weak.ticks_needed} samples, {weak.ticks_needed / weak.sample_rate:.3g} s"
     return [
         f"{compiled.title}: {design.functions} test functions sin^{design.power} on windows of "
-        f"{2 * engine.hop_s:.6g} s, one every {engine.hop_s:.6g} s;",
-        f"{engine.sample_rate:.6g} samples a second, {design.decimation} make a step. The first estimate comes after "
+        f"{2 * weak.hop_s:.6g} s, one every {weak.hop_s:.6g} s;",
+        f"{weak.sample_rate:.6g} samples a second, {design.decimation} make a step. The first estimate comes after "
         f"{first}.",
         "",
         "Readings [counts]:",

@@ -14,9 +14,9 @@ from pvid.codegen.fixed_model import FixedModel, Reaches, fixed_model, reaches_o
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.refine import RefineFunctions, check_outputs, refine_functions
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
-from pvid.codegen.strong_q31 import FixedStrongEngine
+from pvid.codegen.strong_q31 import StrongQ31
 from pvid.codegen.weak import WeakFunctions, weak_functions_of, weak_model_of
-from pvid.codegen.weak_q31 import FixedEngine
+from pvid.codegen.weak_q31 import WeakQ31
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
@@ -37,9 +37,9 @@ class Options:
     soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
     strong : the strong form as well, an identifier from derivatives of the signals
     design : of the weak form for a rig; None: no NAME_design_f32.h
-    fixed_engine : the fixed-point weak form for a rig; None: no NAME_weak_q31.h
+    weak_q31_for_run : the fixed-point weak form for a rig; None: no NAME_weak_q31.h
     strong_design : settings of the strong form for a rig; None: no NAME_strong_design_f32.h
-    strong_engine : the fixed-point strong form for a rig; None: no NAME_strong_q31.h
+    strong_q31 : the fixed-point strong form for a rig; None: no NAME_strong_q31.h
     refine_design : settings of the refinement for a rig; None: no NAME_refine_design_f32.h
     """
 
@@ -47,9 +47,9 @@ class Options:
     soft_signs: Mapping[str, float] = field(default_factory=dict)
     strong: bool = False
     design: WeakConfig | None = None
-    fixed_engine: FixedEngine | None = None
+    weak_q31_for_run: WeakQ31 | None = None
     strong_design: StrongModelConfig | None = None
-    strong_engine: FixedStrongEngine | None = None
+    strong_q31: StrongQ31 | None = None
     refine_design: RefineConfig | None = None
 
 

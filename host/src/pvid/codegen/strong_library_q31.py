@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen import files_strong_q31
-from pvid.codegen.strong_q31 import FixedStrongEngine
+from pvid.codegen.strong_q31 import StrongQ31
 from pvid.core.headers import Filled
 from pvid.core.model_library import ModelSources
 from pvid.core.native import Native, Stepper
@@ -49,23 +49,23 @@ void pvid_replay_readings_q31({name}_q31 *self, uint32_t ticks, const int32_t re
 """
 
 
-def strong_sources_q31(engine: FixedStrongEngine) -> ModelSources:
+def strong_sources_q31(strong_q31: StrongQ31) -> ModelSources:
     """C of the strong form for a rig, in fixed point."""
-    name = engine.name
+    name = strong_q31.name
     words = {"name": name, "upper": name.upper()}
     texts = {
-        **files_strong_q31.files_of(engine, _MADE_BY),
+        **files_strong_q31.files_of(strong_q31, _MADE_BY),
         f"{name}_replay.h": _HEADER.format(**words),
         f"{name}_replay.c": _SOURCE.format(**words),
     }
-    return ModelSources(name, texts, roomy(engine.sizes), STRONG_FIXED, (f"{name}_replay.h",))
+    return ModelSources(name, texts, roomy(strong_q31.sizes), STRONG_FIXED, (f"{name}_replay.h",))
 
 
 class StrongNativeQ31(Native):
     """A library of pvid.core.model_library with the strong form for a rig; PvidError when there is no compiler."""
 
-    def __init__(self, engine: FixedStrongEngine) -> None:
-        self.engine, self.sources = engine, strong_sources_q31(engine)
+    def __init__(self, strong_q31: StrongQ31) -> None:
+        self.strong_q31, self.sources = strong_q31, strong_sources_q31(strong_q31)
         path: Path = self.sources.library()
         super().__init__(path)
 
@@ -80,10 +80,10 @@ class StrongIdentifierQ31(Stepper):
     _prefix = ""
 
     def __init__(self, native: StrongNativeQ31) -> None:
-        name = native.engine.name
+        name = native.strong_q31.name
         settings = getattr(native.library, f"{name}_settings")[0]  # a constant of the library
         self._owned = native.headers.ffi.new(f"{name}_config_q31 *", settings)
-        super().__init__(native, name, "q31", native.engine.config, replay="readings")
+        super().__init__(native, name, "q31", native.strong_q31.config, replay="readings")
 
     def _filled_with(self, native: Native, kind: str, config: object) -> Filled:
         """A copy of the configuration in the library."""

@@ -69,7 +69,7 @@ def fixed_strong(strong: StrongFunctions, reaches: Sequence[float], bounds: Sequ
 
 
 @dataclass(frozen=True, eq=False)
-class FixedStrongEngine:
+class StrongQ31:
     """A mechanism's fixed-point strong form for a rig.
 
     Attributes

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen.strong_library_q31 import strong_sources_q31
-from pvid.codegen.strong_q31 import FixedStrongEngine
+from pvid.codegen.strong_q31 import StrongQ31
 from pvid.core.model_library import NATIVE, core_of
 from pvid.core.sources import FOLDERS
 from pvid.settings.record import Record
@@ -23,10 +23,10 @@ class StrongTwinQ31:
     state : NAME_strong_q31 as printed
     """
 
-    def __init__(self, engine: FixedStrongEngine) -> None:
-        sources, name = strong_sources_q31(engine), engine.name
+    def __init__(self, strong_q31: StrongQ31) -> None:
+        sources, name = strong_sources_q31(strong_q31), strong_q31.name
         self._module = printed_module(
-            core_of(sources.engine, False),
+            core_of(sources.build, False),
             [*FOLDERS, NATIVE],
             {macro: str(size) for macro, size in sources.sizes.items()},
             [*(f"{name}_{verb}_q31" for verb in ("init_layout", "step", "gap", "freeze")), f"{name}_config"],

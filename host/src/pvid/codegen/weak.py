@@ -1,4 +1,4 @@
-"""The weak form of a model as the engine of weak.h takes it: functions to generate, tables of channels and terms.
+"""The weak form of a model as the identifier of weak.h takes it: functions to generate, tables of channels and terms.
 
     jets -> prepare -> derivatives of the runs, arguments of sgn
     jets, runs, signs -> values -> gains, integrands
@@ -46,7 +46,7 @@ _SOURCES = {"jump": Source.JUMP, "before": Source.LAST, "after": Source.SAMPLED}
 
 @dataclass(frozen=True)
 class WeakFunctions:
-    """What is generated for the weak engine, and its tables.
+    """What is generated for the weak identifier, and its tables.
 
     Attributes
     ----------
@@ -93,12 +93,12 @@ class WeakFunctions:
 
 @Recent
 def weak_functions_of(compiled: CompiledModel) -> WeakFunctions:
-    """What is generated for the weak engine; `compiled` is the model without corners.
+    """What is generated for the weak identifier; `compiled` is the model without corners.
 
     Raises
     ------
     PvidError
-        Where a channel needs what the engine has no state for.
+        Where a channel needs what the identifier has no state for.
     """
     made = ready(compiled)
     model, whole = made.model, made.channels
@@ -157,7 +157,7 @@ def weak_model_of(compiled: CompiledModel) -> WeakModel:
     Raises
     ------
     PvidError
-        Where the engine does not have what the model needs.
+        Where the identifier does not have what the model needs.
     """
     refuse_too_many_unknowns(compiled)
     made = weak_functions_of(compiled)
@@ -238,14 +238,14 @@ class _Plain:
         found = self(expression)
         if found.free_symbols - jets(found):
             raise PvidError(
-                f"{self._name}: {expression} has a sign or an integral inside, which the weak engine cannot nest"
+                f"{self._name}: {expression} has a sign or an integral inside, which the weak identifier cannot nest"
             )
         return found
 
     def _run(self, integral: sp.Expr) -> sp.Symbol:
         integrand, fold = integral.args
         if fold != 1:
-            raise PvidError(f"{self._name}: {integral} since the start of the run: the weak engine integrates once")
+            raise PvidError(f"{self._name}: {integral} since the start of the run: the weak identifier integrates once")
         inside = self.of_jets(integrand)
         for mark, one in self.runs.items():
             if one == inside:
@@ -267,7 +267,7 @@ class _Shelf:
     def place_of(self, channel: Channel) -> int:
         """Of a channel of the oracle; an integral's companions are added by `complete`."""
         if channel.fold > _HIGHEST_FOLD:
-            raise PvidError(f"{channel.gain} times a {channel.fold}-fold integral: the weak engine has two at most")
+            raise PvidError(f"{channel.gain} times a {channel.fold}-fold integral: the weak identifier has two at most")
         gain = self._plain(channel.gain)
         if channel.fold == 0:
             return self._put(WeakChannel(NONE if gain == _ONE else self._in(self.gains, gain)))

@@ -27,7 +27,7 @@ def weak_sources(
     Raises
     ------
     PvidError
-        When the engine does not have what the model needs.
+        When the identifier does not have what the model needs.
     """
     model = GeneratedModel(compiled, _MADE_BY)
     name = model.weak.needed.name

@@ -1,4 +1,4 @@
-"""The fixed-point weak engine of a model: formats from the reach of each jet and the bounds of p, and their twins."""
+"""The fixed-point weak form of a model: formats from the reach of each jet and the bounds of p, and their twins."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class JetReaches:
 
 @dataclass(frozen=True)
 class FixedWeak:
-    """Fixed-point functions of the weak engine.
+    """Fixed-point functions of the weak identifier.
 
     Attributes
     ----------
@@ -209,8 +209,8 @@ def _bits_of_p(functions: ModelFunctions, function: Function, bounds: Sequence[I
 
 
 @dataclass(frozen=True, eq=False)
-class FixedEngine:
-    """A mechanism's fixed-point engine for a rig.
+class WeakQ31:
+    """A mechanism's fixed-point identifier for a rig.
 
     Attributes
     ----------

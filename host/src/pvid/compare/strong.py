@@ -70,10 +70,10 @@ class StrongComparison:
     def _fixed(
         cls, design: StrongDesignQ31, names: Sequence[str], progress: Callable[[int], None] | None
     ) -> StrongComparison:
-        identifier = StrongNativeQ31(design.engine).started()
+        identifier = StrongNativeQ31(design.strong_q31).started()
         record = identifier.run_samples(design.counts)
-        twin = StrongTwinQ31(design.engine).run(design.counts, progress)
-        model = design.engine.made.parameters.model
+        twin = StrongTwinQ31(design.strong_q31).run(design.counts, progress)
+        model = design.strong_q31.made.parameters.model
         found = _compared(identifier, record, twin, names, (model.moments, model.n_theta))
         return cls(design, found, record.hash, STRONG_FIXED.name)
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy.typing as npt
 
 from pvid.codegen.weak_library import weak_native, weak_native_q31
-from pvid.codegen.weak_q31 import FixedEngine
+from pvid.codegen.weak_q31 import WeakQ31
 from pvid.compare.bits import Comparison, first_difference
 from pvid.configuration.weak import config_to_identify, samples_of
-from pvid.configuration.weak_q31 import engine_to_identify
+from pvid.configuration.weak_q31 import weak_q31_to_identify
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
@@ -30,7 +30,7 @@ def compare_recording(
     progress: Progress | None = None,
     ranking: Sequence[Scored] = (),
 ) -> Comparison:
-    """Runs a recording through the engine and its twin, with the design that `identify` chooses.
+    """Runs a recording through the identifier and its twin, with the design that `identify` chooses.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def compare_recording(
     Raises
     ------
     PvidError
-        When there is no C compiler, or the engine does not have what the model needs.
+        When there is no C compiler, or the identifier does not have what the model needs.
     """
     return _COMPARISONS[core](compiled, recording, progress, ranking)
 
@@ -54,8 +54,8 @@ def _in_float(
 def _in_fixed_point(
     compiled: CompiledModel, recording: Recording, progress: Progress | None, ranking: Sequence[Scored]
 ) -> Comparison:
-    engine = engine_to_identify(compiled, recording, ranking)
-    return compare_counts(engine, engine.counts_of(recording.signals), progress)
+    weak = weak_q31_to_identify(compiled, recording, ranking)
+    return compare_counts(weak, weak.counts_of(recording.signals), progress)
 
 
 _COMPARISONS = dict(zip(CORES, (_in_float, _in_fixed_point), strict=True))
@@ -77,14 +77,14 @@ def compare_samples(
     )
 
 
-def compare_counts(engine: FixedEngine, readings: npt.ArrayLike, progress: Progress | None = None) -> Comparison:
+def compare_counts(weak: WeakQ31, readings: npt.ArrayLike, progress: Progress | None = None) -> Comparison:
     """The same in fixed point, for readings [ticks, samples]."""
-    native = weak_native_q31(engine.made, engine.parameters, engine.config)
-    identifier, twin = native.identifier(), PrintedTwin(native.sources, engine.config)
+    native = weak_native_q31(weak.made, weak.parameters, weak.config)
+    identifier, twin = native.identifier(), PrintedTwin(native.sources, weak.config)
     record, own = identifier.run_samples(readings), twin.run(readings, progress)
     return Comparison(
         ticks=len(record.reason),
         core_hash=identifier.running_hash,
         twin_hash=twin.running_hash,
-        difference=first_difference(record, own, engine.compiled.p_names, engine.parameters.model.moments),
+        difference=first_difference(record, own, weak.compiled.p_names, weak.parameters.model.moments),
     )

@@ -1,4 +1,4 @@
-"""What the weak engine's design for a described mechanism is, and which errors it predicts, before it is built."""
+"""What the weak identifier's design for a described mechanism is, and which errors it predicts, before it is built."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pvid.oracle.weak.choice import Scored, ranked, score_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import ready
 from pvid.rig.run import Recording
-from pvid.setup.weak import for_engine
+from pvid.setup.weak import for_core
 from pvid.sim.simulated_run import RigSimulation
 
 
 @dataclass(frozen=True, eq=False)
-class EngineReport:
-    """A design of the engine on a run.
+class DesignReport:
+    """A design of the identifier on a run.
 
     Attributes
     ----------
@@ -72,19 +72,19 @@ class EngineReport:
         }
 
 
-def report_for_recording(compiled: CompiledModel, recording: Recording) -> EngineReport:
+def report_for_recording(compiled: CompiledModel, recording: Recording) -> DesignReport:
     """The design that `identify --core f32` and `model build --run` choose for a recording.
 
     Raises
     ------
     PvidError
-        When the recording is too short, or the engine does not have what the model needs.
+        When the recording is too short, or the identifier does not have what the model needs.
     """
     chosen = design_for_recording(ready(compiled), recording.signals, recording.sample_rate)
-    return EngineReport(compiled, chosen, len(recording) / recording.sample_rate)
+    return DesignReport(compiled, chosen, len(recording) / recording.sample_rate)
 
 
-def report_for_rig(compiled: CompiledModel) -> EngineReport:
+def report_for_rig(compiled: CompiledModel) -> DesignReport:
     """The design of a shipped mechanism's simulated rig.
 
     Raises
@@ -97,14 +97,14 @@ def report_for_rig(compiled: CompiledModel) -> EngineReport:
     rig = simulated_rig(compiled.name)
     simulation = RigSimulation.of(compiled, rig)
     run = simulation.run()
-    design = for_engine(WeakDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
+    design = for_core(WeakDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
     found = score_of(ready(simulation.model), run, design, np.asarray(simulation.truth), False)
     assert found is not None  # a rig that is shipped has a design that suits it
-    return EngineReport(compiled, found, rig.duration)
+    return DesignReport(compiled, found, rig.duration)
 
 
 def designs_tried(compiled: CompiledModel, recording: Recording) -> tuple[list[Scored], Scored]:
-    """Designs of the analysis in float64, the best first, and the one that the engine gets.
+    """Designs of the analysis in float64, the best first, and the one that the identifier gets.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A rig without a recording: a simulated run of its guess, and the design of the weak engine for it.
+"""A rig without a recording: a simulated run of its guess, and the design of the weak identifier for it.
 
 The run is that of the shipped rig, scaled to the guess (pvid.sim.scaled_rig). So is the design: windows are as many
 slow periods long, steps and filters as large a part of the fast one.
@@ -22,7 +22,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.setup.weak import for_engine
+from pvid.setup.weak import for_core
 from pvid.sim.scaled_rig import ScaledRig, scaled_rig
 from pvid.sim.simulated_run import RigSimulation
 
@@ -38,7 +38,7 @@ class NominalRun:
     ----------
     compiled : the mechanism with the values of the rig
     recording : of the guess
-    chosen : a design that the engine has, with its predicted errors
+    chosen : a design that the identifier has, with its predicted errors
     p : the guess [n_p]
     """
 
@@ -93,7 +93,7 @@ def _design(compiled: CompiledModel, recording: Recording, p: Float, scaled: Sca
     model = ready(compiled)
     try:
         like = _scaled(simulated_rig(compiled.name), recording.sample_rate, scaled.longer, scaled.slower / _FASTER)
-        found = score_of(model, recording.signals, for_engine(like), p, False)
+        found = score_of(model, recording.signals, for_core(like), p, False)
     except PvidError:  # a design that there is not, as with few samples in a window
         found = None
     if found is not None and found.known:

@@ -1,4 +1,4 @@
-"""Settings of the refinement in float32 behind the weak engine, of any mechanism that it takes."""
+"""Settings of the refinement in float32 behind the weak identifier, of any mechanism that it takes."""
 
 from __future__ import annotations
 
@@ -114,8 +114,8 @@ def refine_settings(
         Where the refinement in C does not have an input of the model, or samples are too slow for the motion.
     """
     model = made.model
-    engine = weak_model_of(model)
-    names, sources = engine.sample_names, {one.sample: one.source for one in engine.signal if one.source is Source.HELD}
+    weak = weak_model_of(model)
+    names, sources = weak.sample_names, {one.sample: one.source for one in weak.signal if one.source is Source.HELD}
     inputs = [_input(made, jet) for jet in made.inputs]
     turning = {name for name, turns in zip(made.outputs, made.turning, strict=True) if turns}
     samples = [*inputs, *((name, 0, 1.0) for name in made.outputs)]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.strong import StrongFunctions
-from pvid.codegen.strong_q31 import FixedStrong, FixedStrongEngine, fixed_strong
+from pvid.codegen.strong_q31 import FixedStrong, StrongQ31, fixed_strong
 from pvid.configuration.strong import StrongDesign, strong_design
 from pvid.configuration.weak_q31 import FULL_SCALE, HIGHEST_JET, finer, lsb_of
 from pvid.design.bank_q31 import FULL_SCALE_LIMIT, HELD_MOST, HELD_UNITS, BankQ31, integer_bank
@@ -44,12 +44,12 @@ class StrongDesignQ31:
     Attributes
     ----------
     base : window and fit, as float32 has them
-    engine : functions, formats and settings
+    strong_q31 : functions, formats and settings
     counts : of the recording, int32 [ticks, signals]
     """
 
     base: StrongDesign
-    engine: FixedStrongEngine
+    strong_q31: StrongQ31
     counts: npt.NDArray[np.int32]
 
     @property
@@ -60,7 +60,7 @@ class StrongDesignQ31:
     @property
     def config(self) -> StrongModelConfigQ31:
         """Settings in fixed point."""
-        return self.engine.config
+        return self.strong_q31.config
 
 
 def strong_design_to_identify(model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY) -> StrongDesignQ31:
@@ -76,7 +76,7 @@ def fixed_design(
 
     Parameters
     ----------
-    between_counts : as of pvid.configuration.weak_q31.fixed_engine
+    between_counts : as of pvid.configuration.weak_q31.weak_q31_for_run
 
     Raises
     ------
@@ -124,8 +124,8 @@ def fixed_design(
         raw=_raw(made, lsb),
         integral_down=down,
     )
-    engine = FixedStrongEngine(made, config, lsb)
-    return StrongDesignQ31(base, engine, _counts(strong, recording.signals, lsb))
+    strong_q31 = StrongQ31(made, config, lsb)
+    return StrongDesignQ31(base, strong_q31, _counts(strong, recording.signals, lsb))
 
 
 def _signals(strong: StrongFunctions, recording: Recording) -> list[Float]:

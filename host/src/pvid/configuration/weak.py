@@ -1,4 +1,4 @@
-"""The weak engine's design and settings for a rig: from a recording of it, or from a shipped rig's simulation."""
+"""The weak identifier's design and settings for a rig: from a recording of it, or from a shipped rig's simulation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.weak import weak_model_of
 from pvid.model.compiled import CompiledModel
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.weak.choice import MODEL_ERROR, Scored, ranked, ranked_for_engine, score_of
+from pvid.oracle.weak.choice import MODEL_ERROR, Scored, ranked, ranked_for_core, score_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
@@ -21,7 +21,7 @@ from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
 from pvid.rig.run import Recording
 from pvid.settings.weak import WeakConfig, WeakDesign32
-from pvid.setup.weak import LONGEST_HOP, config_of, design_tables, for_engine
+from pvid.setup.weak import LONGEST_HOP, config_of, design_tables, for_core
 from pvid.sim.simulated_run import RigSimulation
 
 Run = Mapping[str, npt.ArrayLike]
@@ -37,31 +37,31 @@ _DEGREE, _LOW_DEGREE = 6, 4
 _SHORT = 15  # taps, for which the lower degree is
 
 
-def engine_config(
+def weak_config(
     compiled: CompiledModel, run: Run, design: WeakDesign, p: Float | None = None, *, start_there: bool = False
 ) -> WeakConfig:
-    """Settings of the engine for a rig, from a run of it.
+    """Settings of the identifier for a rig, from a run of it.
 
     Parameters
     ----------
     run : name of each signal -> samples [n]
-    design : of the oracle; the engine gets the nearest one that it has
+    design : of the oracle; the identifier gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
-    start_there : the engine starts at the parameters of this run; False: at the guesses
+    start_there : the identifier starts at the parameters of this run; False: at the guesses
 
     Raises
     ------
     PvidError
-        Where the engine does not have what the model or the design needs.
+        Where the identifier does not have what the model or the design needs.
     """
-    made = engine_tables(compiled, run, design, p)
+    made = weak_tables(compiled, run, design, p)
     return config_of(
         made.tables, design.sample_rate, made.rows.compiled.parameters, made.p if start_there else None, run
     )
 
 
 @dataclass(frozen=True, eq=False)
-class EngineTables:
+class WeakTables:
     """What the settings of both cores follow from.
 
     Attributes
@@ -69,7 +69,7 @@ class EngineTables:
     rows : of the run, in float64
     p : fitted to it [n_p]
     errors : of the equations themselves, of each kind
-    tables : of the float32 engine
+    tables : of the float32 identifier
     """
 
     rows: WeakRows
@@ -78,12 +78,12 @@ class EngineTables:
     tables: WeakDesign32
 
 
-def engine_tables(compiled: CompiledModel, run: Run, design: WeakDesign, p: Float | None = None) -> EngineTables:
-    """Tables of the engine for a rig, from a run of it; parameters as of engine_config."""
+def weak_tables(compiled: CompiledModel, run: Run, design: WeakDesign, p: Float | None = None) -> WeakTables:
+    """Tables of the identifier for a rig, from a run of it; parameters as of weak_config."""
     tables_of = weak_model_of(compiled)
-    rows = WeakRows.of(ready(compiled), run, for_engine(design))
+    rows = WeakRows.of(ready(compiled), run, for_core(design))
     fit = gated(rows, p)
-    return EngineTables(rows, fit.p, list(fit.errors), design_tables(tables_of, rows, fit.p, fit.errors))
+    return WeakTables(rows, fit.p, list(fit.errors), design_tables(tables_of, rows, fit.p, fit.errors))
 
 
 def config_for_recording(
@@ -100,7 +100,7 @@ def config_for_recording(
     ranking : as of design_for_recording
     """
     design, p, known = design_and_p(compiled, recording, functions, ranking)
-    config = engine_config(compiled, recording.signals, design, p, start_there=known)
+    config = weak_config(compiled, recording.signals, design, p, start_there=known)
     return with_neglected(config, neglected_part(compiled, recording.signals))
 
 
@@ -131,15 +131,15 @@ def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: S
 
 
 def design_for_recording(model: Compiled, run: Run, sample_rate: float, ranking: Sequence[Scored] = ()) -> Scored:
-    """The design of the engine with the least predicted errors, then a cheaper one that is nearly as good.
+    """The design of the identifier with the least predicted errors, then a cheaper one that is nearly as good.
 
     A model with corners keeps its sample rate: filters before decimation blur them (measured: 0.2 % of a motor's L).
 
     Parameters
     ----------
-    ranking : of the analysis of the same run in float64, from the guesses on; used where the engine's is the same
+    ranking : of the analysis of the same run in float64, from the guesses on; used where the identifier's is the same
     """
-    tried = ranked_for_engine(model, ranking) or ranked(model, run, sample_rate, reversals="averaged")
+    tried = ranked_for_core(model, ranking) or ranked(model, run, sample_rate, reversals="averaged")
     best = tried[0]
 
     def scored(designs: Iterable[WeakDesign]) -> list[Scored]:
@@ -152,12 +152,12 @@ def design_for_recording(model: Compiled, run: Run, sample_rate: float, ranking:
 
 
 def _cheapest(tried: Sequence[Scored], best: Scored) -> Scored:
-    """The last one that is nearly as good as the best and agrees with it, or the best of those that the engine has."""
+    """The last one that is nearly as good as the best and agrees with it, or the best of those that the core has."""
     possible = [one for one in tried if one.design.hop <= LONGEST_HOP]
     if not possible:
         raise PvidError(
             f"half a window of {tried[0].design.window_s / 2:.3g} s has more than {LONGEST_HOP} samples, the most of "
-            "the weak engine: record at a lower rate"
+            "the weak identifier: record at a lower rate"
         )
     good = [one for one in possible if one.score <= _COST * best.score and np.all(np.abs(one.p - best.p) <= best.error)]
     return good[-1] if good else min(possible, key=lambda one: one.score)
@@ -171,7 +171,7 @@ def _decimated(design: WeakDesign) -> Iterator[WeakDesign]:
         rates = (taps, degree) if design.rate_taps < taps else (design.rate_taps, design.rate_degree)
         try:
             found = replace(design, decimation=decimation, taps=taps, degree=degree)
-            yield for_engine(replace(found, rate_taps=rates[0], rate_degree=rates[1]))
+            yield for_core(replace(found, rate_taps=rates[0], rate_degree=rates[1]))
         except PvidError:  # too few steps
             return
 
@@ -192,7 +192,7 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
         Where the mechanism has no shipped rig.
     """
     run, design, p = simulated_run_of(compiled, functions)
-    return engine_config(compiled, run, design, p)
+    return weak_config(compiled, run, design, p)
 
 
 def config_for_rig_like_the_shipped(compiled: CompiledModel, functions: int | None = None) -> WeakConfig:

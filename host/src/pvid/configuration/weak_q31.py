@@ -1,4 +1,4 @@
-"""The fixed-point weak engine for a rig: formats, tables and settings, from a recording or a simulation."""
+"""The fixed-point weak identifier for a rig: formats, tables and settings, from a recording or a simulation."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
-from pvid.codegen.weak_q31 import FixedEngine, FixedWeak, JetReaches, ParametersQ31, fixed_parameters, fixed_weak
-from pvid.configuration.weak import Run, design_and_p, engine_tables, neglected_part, simulated_run_of
+from pvid.codegen.weak_q31 import FixedWeak, JetReaches, ParametersQ31, WeakQ31, fixed_parameters, fixed_weak
+from pvid.configuration.weak import Run, design_and_p, neglected_part, simulated_run_of, weak_tables
 from pvid.design.weak_q31 import Sensing, fixed_design, most_counts
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
@@ -34,7 +34,7 @@ _FINER_BITS = 10  # at most
 _LONGEST_RUN_S = 3600.0  # of integrals since the start of the run, at least
 
 
-def fixed_engine(
+def weak_q31_for_run(
     compiled: CompiledModel,
     run: Run,
     design: WeakDesign,
@@ -43,26 +43,26 @@ def fixed_engine(
     start_there: bool = False,
     between_counts: bool = False,
     soft_signs: Mapping[str, float] | None = None,
-) -> FixedEngine:
-    """The engine for a rig, from a run of it.
+) -> WeakQ31:
+    """The identifier for a rig, from a run of it.
 
     Parameters
     ----------
-    design : of the oracle; the engine gets the nearest one that it has
+    design : of the oracle; the identifier gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
-    start_there : the engine starts at the parameters of this run; False: at the guesses
+    start_there : the identifier starts at the parameters of this run; False: at the guesses
     between_counts
-        samples of the run that lie between counts, as with an offset taken off, are not rounded to them: the engine
+        samples of the run that lie between counts, as with an offset taken off, are not rounded to them: the identifier
         gets finer counts; False: those of the sensor, as of a board
     soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
 
     Raises
     ------
     PvidError
-        Where fixed point, or the engine, does not have what the model or the design needs.
+        Where fixed point, or the identifier, does not have what the model or the design needs.
     """
     functions = weak_functions_of(compiled)
-    found = engine_tables(compiled, run, design, p)
+    found = weak_tables(compiled, run, design, p)
     known = {one.name: one for one in compiled.signals}
     lsb = lsb_of(compiled, functions.samples)
     largest = [float(np.nanmax(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
@@ -99,7 +99,7 @@ def fixed_engine(
     if still is not None:
         least = tuple(min(round(float(x) / step), 2**24) for x, step in zip(still, lsb, strict=True))
         config = replace(config, drive_min=least)
-    return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
+    return WeakQ31(compiled, made, parameters, config, design.sample_rate, lsb)
 
 
 def finer(step: float, samples: npt.ArrayLike, room: float) -> float:
@@ -121,14 +121,14 @@ def _parameters(functions: WeakFunctions, known: Parameters) -> ParametersQ31:
     return fixed_parameters(functions.functions, bounds)
 
 
-def engine_of_parts(compiled: CompiledModel, made: FixedWeak, config: WeakConfigQ31, sample_rate: float) -> FixedEngine:
-    """An engine whose formats and settings are known, as from a log."""
+def weak_q31_of_parts(compiled: CompiledModel, made: FixedWeak, config: WeakConfigQ31, sample_rate: float) -> WeakQ31:
+    """An identifier whose formats and settings are known, as from a log."""
     parameters = _parameters(made.functions, ready(compiled).parameters)
     lsb = lsb_of(compiled, made.functions.samples)
-    return FixedEngine(compiled, made, parameters, config, sample_rate, lsb)
+    return WeakQ31(compiled, made, parameters, config, sample_rate, lsb)
 
 
-def engine_for_recording(
+def weak_q31_for_recording(
     compiled: CompiledModel,
     recording: Recording,
     functions: int | None = None,
@@ -136,17 +136,17 @@ def engine_for_recording(
     ranking: Sequence[Scored] = (),
     *,
     between_counts: bool = False,
-) -> FixedEngine:
+) -> WeakQ31:
     """For the rig that made a recording, with the design that float32 gets.
 
     Parameters
     ----------
     functions : K; None: chosen
-    soft_signs, between_counts : as of fixed_engine
+    soft_signs, between_counts : as of weak_q31_for_run
     ranking : as of pvid.configuration.weak.design_for_recording
     """
     design, p, known = design_and_p(compiled, recording, functions, ranking)
-    engine = fixed_engine(
+    weak = weak_q31_for_run(
         compiled,
         recording.signals,
         design,
@@ -155,33 +155,33 @@ def engine_for_recording(
         between_counts=between_counts,
         soft_signs=soft_signs,
     )
-    return with_neglected(engine, neglected_part(compiled, recording.signals))
+    return with_neglected(weak, neglected_part(compiled, recording.signals))
 
 
-def with_neglected(engine: FixedEngine, part: float) -> FixedEngine:
+def with_neglected(weak: WeakQ31, part: float) -> WeakQ31:
     """With standard errors that contain a relative error of p because equations are linearised."""
-    trust = replace(engine.config.trust, neglected=round(part * 2**_PART_BITS))
-    return replace(engine, config=replace(engine.config, trust=trust))
+    trust = replace(weak.config.trust, neglected=round(part * 2**_PART_BITS))
+    return replace(weak, config=replace(weak.config, trust=trust))
 
 
-def engine_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FixedEngine:
+def weak_q31_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> WeakQ31:
     """The same, to identify the recording itself: as config_to_identify."""
-    engine = engine_for_recording(compiled, recording, ranking=ranking, between_counts=True)
-    trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS), neglected=0)
-    return replace(engine, config=replace(engine.config, trust=trust))
+    weak = weak_q31_for_recording(compiled, recording, ranking=ranking, between_counts=True)
+    trust = replace(weak.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS), neglected=0)
+    return replace(weak, config=replace(weak.config, trust=trust))
 
 
-def engine_for_simulated_rig(
+def weak_q31_for_simulated_rig(
     compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
-) -> FixedEngine:
+) -> WeakQ31:
     """For the shipped rig of a mechanism, with its own design."""
     run, design, p = simulated_run_of(compiled, functions)
-    return fixed_engine(compiled, run, design, p, soft_signs=soft_signs)
+    return weak_q31_for_run(compiled, run, design, p, soft_signs=soft_signs)
 
 
-def engine_for_rig_like_the_shipped(
+def weak_q31_for_rig_like_the_shipped(
     compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
-) -> FixedEngine:
+) -> WeakQ31:
     """The same for a real rig that moves as much: as config_for_rig_like_the_shipped."""
     part = neglected_part(compiled, simulated_run_of(compiled, functions)[0])
-    return with_neglected(engine_for_simulated_rig(compiled, functions, soft_signs), part)
+    return with_neglected(weak_q31_for_simulated_rig(compiled, functions, soft_signs), part)

@@ -35,7 +35,7 @@ class ModelSources:
     name: str
     texts: Mapping[str, str]
     sizes: Mapping[str, int]
-    engine: CoreBuild = FLOAT
+    build: CoreBuild = FLOAT
     headers: Sequence[str] | None = None
 
     @property
@@ -45,14 +45,14 @@ class ModelSources:
 
     def library(self) -> Path:
         """The shared library; raises as `model_library`."""
-        return model_library(self.name, self.texts, self.sizes, self.engine, self.headers)
+        return model_library(self.name, self.texts, self.sizes, self.build, self.headers)
 
 
 def model_library(
     name: str,
     texts: Mapping[str, str],
     sizes: Mapping[str, int],
-    engine: CoreBuild = FLOAT,
+    build: CoreBuild = FLOAT,
     headers: Sequence[str] | None = None,
 ) -> Path:
     """The shared library, beside it what cffi reads.
@@ -62,7 +62,7 @@ def model_library(
     name : of the mechanism, for the file's name
     texts : file name -> generated C
     sizes : PVID_MAX_ macro -> value
-    engine : its arithmetic, or the strong form
+    build : its arithmetic, or the strong form
     headers : names of the texts that cffi reads; None: all headers
 
     Raises
@@ -73,12 +73,12 @@ def model_library(
     compiler = host_compiler(_WHAT)
     definitions = options_of(sizes)
     key = hashlib.sha256("\0".join([build_of(compiler), *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
-    folder = cache_folder() / "models" / f"{name}-{engine.name}-{key.hexdigest()[:20]}"
+    folder = cache_folder() / "models" / f"{name}-{build.name}-{key.hexdigest()[:20]}"
     library = folder / f"lib{name}.so"
     if not library.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
         declared = headers or sorted(one for one in texts if one.endswith(".h"))
-        _build(compiler, texts, definitions, library, engine, declared)
+        _build(compiler, texts, definitions, library, build, declared)
     return library
 
 
@@ -87,12 +87,12 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def core_of(engine: CoreBuild, refined: bool) -> list[Path]:
+def core_of(build: CoreBuild, refined: bool) -> list[Path]:
     """Sources beside the generated ones. refined: with the second stage."""
-    rooms = (*_ROOMS, engine.room, *(["refine"] if refined else []))
+    rooms = (*_ROOMS, build.room, *(["refine"] if refined else []))
     found = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in rooms]
-    replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if refined else [])]
-    kept = [path for path in found if not path.stem.endswith(engine.without)]
+    replays = [*([] if build.replay is None else [build.replay]), *(["replay_refine"] if refined else [])]
+    kept = [path for path in found if not path.stem.endswith(build.without)]
     return [*kept, *(NATIVE / f"{name}.c" for name in replays)]
 
 
@@ -127,7 +127,7 @@ def _build(
     texts: Mapping[str, str],
     definitions: list[str],
     library: Path,
-    engine: CoreBuild,
+    build: CoreBuild,
     headers: Sequence[str],
 ) -> None:
     """Whole or not at all: several processes may build the same."""
@@ -142,13 +142,13 @@ def _build(
             (folder / name).write_text(text, encoding="utf-8")
         options = [f"-I{folder.name}", *core_options(definitions), f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        core = _core_objects(compiler, definitions, engine, library.parent.parent)
+        core = _core_objects(compiler, definitions, build, library.parent.parent)
         if _REFINED in texts:
             core = [one for one in core if not of_second_stage(Path(one))]
-            code += [one for one in core_of(engine, True) if of_second_stage(one)]
+            code += [one for one in core_of(build, True) if of_second_stage(one)]
         objects = [*core, *objects_of(compiler, options, code, Path(made))]
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
-        declared = _declarations(compiler, headers, options, Path(made), engine)
+        declared = _declarations(compiler, headers, options, Path(made), build)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
         try:
             folder.rename(library.parent)
@@ -157,12 +157,12 @@ def _build(
                 raise
 
 
-def _core_objects(compiler: str, definitions: list[str], engine: CoreBuild, cache_folder: Path) -> list[str]:
+def _core_objects(compiler: str, definitions: list[str], build: CoreBuild, cache_folder: Path) -> list[str]:
     """Of the core without the second stage: those of one size are the same for every mechanism."""
-    sources = core_of(engine, False)
+    sources = core_of(build, False)
     named = [str(one) for one in sources]
     key = hashlib.sha256("\0".join([build_of(compiler), *_FLAGS, *definitions, *named, _core_hash()]).encode())
-    place = cache_folder / f"core-{engine.name}-{key.hexdigest()[:20]}"
+    place = cache_folder / f"core-{build.name}-{key.hexdigest()[:20]}"
     with FileLock(place.with_name(f".{place.name}.lock")):
         if not place.exists():
             with tempfile.TemporaryDirectory(dir=cache_folder) as made:
@@ -173,13 +173,13 @@ def _core_objects(compiler: str, definitions: list[str], engine: CoreBuild, cach
     return sorted(map(str, place.glob("*.o")))
 
 
-def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, engine: CoreBuild) -> str:
+def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, build: CoreBuild) -> str:
     """The headers, preprocessed: cffi knows the types of the standard ones."""
     empty = folder / "no_standard_headers"
     empty.mkdir()
     for name in _STANDARD:
         (empty / f"{name}.h").write_text("", encoding="utf-8")
-    replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if _REFINED in headers else [])]
+    replays = [*([] if build.replay is None else [build.replay]), *(["replay_refine"] if _REFINED in headers else [])]
     own = [*(f"{name}.h" for name in replays), *(name for name in headers if name != _REFINED)]
     top = folder / "native.h"
     top.write_text("".join(f'#include "{name}"\n' for name in own), encoding="utf-8")

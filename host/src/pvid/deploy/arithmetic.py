@@ -15,16 +15,16 @@ class Arithmetic:
 
     Attributes
     ----------
-    engine : its name and words
+    build : of the core, its name and words
     without : end of the names of sources that it does without
-    header, snapshot_header : of the engine
+    header, snapshot_header : of the identifier
     sample_type : in C
     samples : what a sample is, for a README
     is_integer : samples are counts, and parameters are integers with a scale
     zephyr : settings of a Zephyr application
     """
 
-    engine: CoreBuild
+    build: CoreBuild
     without: str
     header: str
     snapshot_header: str
@@ -36,11 +36,11 @@ class Arithmetic:
     @property
     def core(self) -> str:
         """Name, as in the names of functions."""
-        return self.engine.name
+        return self.build.name
 
 
 FLOAT = Arithmetic(
-    engine=FLOAT_CORE,
+    build=FLOAT_CORE,
     without="_q31",
     header="pvid/weak.h",
     snapshot_header="pvid/snapshot_weak.h",
@@ -50,7 +50,7 @@ FLOAT = Arithmetic(
     zephyr="CONFIG_FPU=y\n",
 )
 FIXED = Arithmetic(
-    engine=FIXED_CORE,
+    build=FIXED_CORE,
     without="_f32",
     header="pvid/weak_q31.h",
     snapshot_header="pvid/snapshot_weak_q31.h",

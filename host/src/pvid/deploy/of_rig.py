@@ -1,4 +1,4 @@
-"""A deployment from a mechanism's model and the engine that is designed for its rig."""
+"""A deployment from a mechanism's model and the identifier that is designed for its rig."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pvid.codegen.generated import GeneratedModel, Options
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.codegen.weak_library import weak_native, weak_native_q31
-from pvid.codegen.weak_q31 import FixedEngine
+from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.weak import Run, samples_of
 from pvid.core.weak_native import RefinedRecord
 from pvid.deploy.arithmetic import FIXED, FLOAT
@@ -46,7 +46,7 @@ def deployment_f32(
     Raises
     ------
     PvidError
-        Where the engine does not have what the model needs.
+        Where the identifier does not have what the model needs.
     """
     made, design = weak_functions_of(compiled), config.design
     model, name = design.model, design.model.name
@@ -90,35 +90,35 @@ def deployment_f32(
     )
 
 
-def deployment_q31(engine: FixedEngine, run: Run, command: str) -> Deployment:
+def deployment_q31(weak: WeakQ31, run: Run, command: str) -> Deployment:
     """In fixed point; parameters as of deployment_f32."""
-    compiled, design = engine.compiled, engine.config.design
+    compiled, design = weak.compiled, weak.config.design
     units = {one.name: one.unit for one in compiled.signals}
-    counts = engine.counts_of(run)[: _most_ticks(len(engine.lsb))]
-    native = weak_native_q31(engine.made, engine.parameters, engine.config)
+    counts = weak.counts_of(run)[: _most_ticks(len(weak.lsb))]
+    native = weak_native_q31(weak.made, weak.parameters, weak.config)
     record = native.identifier().run_samples(counts, sums=False, hashes=False)
-    scale = engine.values(np.ones(len(compiled.unknowns)))
+    scale = weak.values(np.ones(len(compiled.unknowns)))
     notes = [
         f"one count is {lsb:.6g} {units[one] or '1'}".rstrip()
-        for one, lsb in zip(engine.sample_names, engine.lsb, strict=True)
+        for one, lsb in zip(weak.sample_names, weak.lsb, strict=True)
     ]
     return Deployment(
-        name=engine.name,
+        name=weak.name,
         title=compiled.title,
         arithmetic=FIXED,
-        sample_rate=engine.sample_rate,
+        sample_rate=weak.sample_rate,
         samples=tuple(
             Quantity(one, units[one], lsb, note)
-            for one, lsb, note in zip(engine.sample_names, engine.lsb, notes, strict=True)
+            for one, lsb, note in zip(weak.sample_names, weak.lsb, notes, strict=True)
         ),
         parameters=tuple(
             Quantity(one.name, one.unit, float(x)) for one, x in zip(compiled.unknowns, scale, strict=True)
         ),
-        sizes=fitted_of(engine),
-        generated=files_of(engine, command),
+        sizes=fitted_of(weak),
+        generated=files_of(weak, command),
         command=command,
-        first_s=engine.ticks_needed / engine.sample_rate,
-        playback=_playback(counts, list(engine.lsb), record, design.hop * design.decimation, scale),
+        first_s=weak.ticks_needed / weak.sample_rate,
+        playback=_playback(counts, list(weak.lsb), record, design.hop * design.decimation, scale),
     )
 
 

@@ -109,7 +109,7 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
         if not 16 <= full <= 2**24:
             raise PvidError(f"full scale of sample {name} is {full} counts: the fixed-point core takes 16 to {2**24}")
     if sizes.hop % BLOCK:
-        raise PvidError(f"half a window has {sizes.hop} steps: the weak engine takes a multiple of {BLOCK}")
+        raise PvidError(f"half a window has {sizes.hop} steps: the weak identifier takes a multiple of {BLOCK}")
     dt = sizes.decimation / sensing.sample_rate
     blocks = tuple(_Block(model, place, sizes.decimation, sensing, margins) for place in range(len(model.signal)))
     filters = tuple(

@@ -16,7 +16,7 @@ from pvid.base.wording import reason
 from pvid.board.mechanism_board import board_of
 from pvid.log.file import Segment
 from pvid.log.reader import LogReader
-from pvid.log.rig import LOG_SUFFIX, engine_text_of_log, hello_of_log
+from pvid.log.rig import LOG_SUFFIX, hello_of_log, settings_text_of_log
 from pvid.log.verify import Verdict, Verifier
 
 _PIECE = 1 << 20
@@ -175,7 +175,7 @@ def _verified(path: Path, model: str | None) -> str:
     """EQUAL, or what is not. `model`: of the question."""
     verdict, first = Verdict(), ""
     try:
-        text = engine_text_of_log(path)
+        text = settings_text_of_log(path)
         board = None if text is None else board_of(text, model)
         for stretch in Verifier(board).stretches(LogReader(path)):
             verdict.add(stretch)

@@ -250,7 +250,7 @@ class Analysis(Answer):
 
     @property
     def ranking(self) -> tuple[Scored, ...]:
-        """The designs that were tried, where they were compared as the engine's are; else ()."""
+        """The designs that were tried, where they were compared as the identifier's are; else ()."""
         return self.found.ranking if self.weights == "residuals" else ()
 
     def as_json(self) -> dict[str, Any]:

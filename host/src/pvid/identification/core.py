@@ -1,7 +1,7 @@
 """Identification of a described mechanism by the C core in float32 or fixed point, compiled for this computer.
 
-The float64 oracle analyses the recording first, for the verdict; then it chooses the engine's design and finds the
-equations' own errors. The engine starts at the guesses and runs over the samples as on a board.
+The float64 oracle analyses the recording first, for the verdict; then it chooses the identifier's design and finds the
+equations' own errors. The identifier starts at the guesses and runs over the samples as on a board.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.weak import config_to_identify, samples_of
-from pvid.configuration.weak_q31 import engine_to_identify
+from pvid.configuration.weak_q31 import weak_q31_to_identify
 from pvid.core.native import Publisher
 from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.values import gains_of, noise_of, shifts_of, unless_held, values_of
@@ -54,13 +54,13 @@ class CoreAnswer(Answer):
     model, recording, advice : of the analysis
     analysis : of the same recording
     core : arithmetic
-    functions, decimation, hop_s : of the engine's design
+    functions, decimation, hop_s : of the identifier's design
     averages_signs : whether signs are averaged over a step
     values : by name: outputs of the model, then p; of the last published estimate
     published : whether there is one
     reason : of the last window
     misfit : of the published estimate; None: not judged
-    windows : how many the engine has judged
+    windows : how many the identifier has judged
     hash : running hash of its state after the last tick
     publications : every estimate that was published; their standard errors contain what `values` contains
     by_analysis : nothing is published, because a parameter may be 0; the values are those of the analysis
@@ -215,7 +215,7 @@ def identify_in_c(answer: Analysis, core: Core = "f32") -> CoreAnswer:
     Raises
     ------
     PvidError
-        When there is no C compiler, or the engine does not have what the model needs.
+        When there is no C compiler, or the identifier does not have what the model needs.
     """
     try:
         run = _RUNS[core](answer)
@@ -245,24 +245,24 @@ def _in_float(answer: Analysis) -> _Run:
 
 
 def _in_fixed_point(answer: Analysis) -> _Run:
-    engine = engine_to_identify(answer.model, answer.recording, answer.ranking)
-    design = engine.config.design
-    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
-    record = identifier.run_samples(engine.counts_of(answer.recording.signals), sums=False)
+    weak = weak_q31_to_identify(answer.model, answer.recording, answer.ranking)
+    design = weak.config.design
+    identifier = weak_native_q31(weak.made, weak.parameters, weak.config).identifier()
+    record = identifier.run_samples(weak.counts_of(answer.recording.signals), sums=False)
     last, n_p = identifier.estimate, len(answer.found.p)
-    se = engine.values(np.maximum(last["se"][:n_p], 1))  # an error below the format's step counts as a step
+    se = weak.values(np.maximum(last["se"][:n_p], 1))  # an error below the format's step counts as a step
     correlation = np.asarray(last["correlation"], np.float64)[:n_p, :n_p] * 2.0**-30
     return _Run(
         "q31",
         design.functions,
         design.decimation,
-        engine.hop_s,
+        weak.hop_s,
         design.model.signs,
         identifier,
         record,
-        engine.values(last["p"][:n_p]),
+        weak.values(last["p"][:n_p]),
         correlation * np.outer(se, se),
-        (engine.values(record.published), engine.values(record.published_se)),
+        (weak.values(record.published), weak.values(record.published_se)),
     )
 
 

@@ -122,10 +122,10 @@ def identify_strong_mechanism(
     running: int | None = None
     p, noise = fitted.p, fitted.noise
     if fixed is not None:
-        stepped = StrongNativeQ31(fixed.engine).started()
+        stepped = StrongNativeQ31(fixed.strong_q31).started()
         record = stepped.run_samples(fixed.counts, sums=False)
-        p = fixed.engine.values(record.p[-1])
-        noise = np.maximum(noise, fixed.engine.values(stepped.assess()["se"][: len(p)]))
+        p = fixed.strong_q31.values(record.p[-1])
+        noise = np.maximum(noise, fixed.strong_q31.values(stepped.assess()["se"][: len(p)]))
         reason, running = _last(record.reason.tolist()), stepped.running_hash
     elif core == STRONG.name:
         identifier = strong_native(design.strong, design.config).identifier_of(design.config)

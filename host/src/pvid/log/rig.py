@@ -14,6 +14,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
+from pvid.board.settings_text import TABLE
 from pvid.link.frames import Hello, Names
 from pvid.link.names import BoardNames
 from pvid.log.mechanism import UNNAMED, LogMechanism, mechanism_described, mechanism_named
@@ -30,7 +31,7 @@ LOG_SUFFIX = ".pvlog"
 _LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
 
 
-def engine_text_of_log(path: Path) -> str | None:
+def settings_text_of_log(path: Path) -> str | None:
     """The rig of a log with the settings of its identifier (board.mechanism_board); None: the log has none.
 
     Raises
@@ -39,7 +40,7 @@ def engine_text_of_log(path: Path) -> str | None:
         When the log cannot be read.
     """
     text = _text_of_log(path)
-    return text if text is not None and is_engine_text(text) else None
+    return text if text is not None and is_settings_text(text) else None
 
 
 def _text_of_log(path: Path) -> str | None:
@@ -50,16 +51,16 @@ def _text_of_log(path: Path) -> str | None:
     return reader.rig
 
 
-def is_engine_text(text: str) -> bool:
+def is_settings_text(text: str) -> bool:
     """Whether the rig of a log has the settings of its identifier."""
     try:
-        return isinstance(toml_document(text).get("engine"), dict)
+        return isinstance(toml_document(text).get(TABLE), dict)
     except PvidError:
         return False
 
 
 def document_of_log(path: Path) -> dict[str, Any] | None:
-    """The tables of the rig in a log, without the engine's; None: the log has none.
+    """The tables of the rig in a log, without the identifier's; None: the log has none.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def document_of_log(path: Path) -> dict[str, Any] | None:
     text = _text_of_log(path)
     if text is None:
         return None
-    return {key: value for key, value in toml_document(text).items() if key != "engine"}
+    return {key: value for key, value in toml_document(text).items() if key != TABLE}
 
 
 def mechanism_of_log(path: Path, rig_path: Path | None = None) -> LogMechanism:

@@ -54,7 +54,7 @@ from pvid.twin.printer.machine import bits
 Check = Estimate | EstimateQ31 | RefinedEstimate | Hash | Credit
 
 
-class EngineBoard(Protocol):
+class ReplayableBoard(Protocol):
     """A board of pvid.board: by the weak form, in fixed point too, or by the strong form."""
 
     @property
@@ -237,7 +237,7 @@ class Verifier:
 
     def __init__(
         self,
-        board: EngineBoard | None,
+        board: ReplayableBoard | None,
         progress: Callable[[int], None] | None = None,
         *,
         twin_alone: bool = False,
@@ -356,7 +356,7 @@ class Verifier:
         stretch.open = not opened.harmed and stretch.trailing <= allowed
 
     def _is_of_another_image(self, configuration: Configuration) -> bool:
-        """Whether bits may differ because this version, with the log's settings, makes another image of the engine."""
+        """Whether bits may differ because this version, with the log's settings, makes another image of the core."""
         if self.board is None:
             return False
         if self._number is None:
@@ -401,7 +401,7 @@ class Verifier:
         return found
 
 
-def _twin_of(board: EngineBoard, configuration: Configuration) -> Twin:
+def _twin_of(board: ReplayableBoard, configuration: Configuration) -> Twin:
     try:
         return board.twin_of(configuration)
     except (IndexError, TypeError, ValueError) as error:

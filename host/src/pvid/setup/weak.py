@@ -1,4 +1,4 @@
-"""Tables of the weak engine for a rig, from a design of the float64 oracle and the rows of a run."""
+"""Tables of the weak identifier for a rig, from a design of the float64 oracle and the rows of a run."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ _STILL = 4.0
 _RAN_DOWN = 1e-6  # of the low end of its range: a positive parameter that may be 0 starts no lower
 
 
-def for_engine(design: WeakDesign) -> WeakDesign:
-    """The nearest design that the engine has: half windows of whole blocks, block sums before a decimation, kinds of
+def for_core(design: WeakDesign) -> WeakDesign:
+    """The nearest design that the core has: half windows of whole blocks, block sums before a decimation, kinds of
     rows one by one, signs averaged.
 
-    A soft sign stays one. The engine does not locate reversals.
+    A soft sign stays one. The core does not locate reversals.
     """
     block = _STEPS_OF_A_BLOCK
     least = -(-2 * (design.highest + 1) // block) * block
@@ -102,11 +102,11 @@ def with_soft_widths(design: WeakDesign32, widths: Mapping[str, float]) -> WeakD
 def _check(design: WeakDesign, rows: WeakRows) -> None:
     name = rows.compiled.model.name
     if design.hop % _STEPS_OF_A_BLOCK or design.joint or design.reversals == "located":
-        raise PvidError(f"{name}: this design is none of the engine's: see for_engine")
+        raise PvidError(f"{name}: this design is none of the identifier's: see for_core")
     top = rows.compiled.channels.top
     if not top + 2 <= design.power <= HIGHEST_POWER:
         raise PvidError(
-            f"{name}: a power of {design.power} for rows of order {top}: the engine has at least 2 more than the order "
+            f"{name}: a power of {design.power} for rows of order {top}: the core has at least 2 more than the order "
             f"and at most {HIGHEST_POWER}"
         )
 
@@ -150,7 +150,7 @@ def config_of(
     start: Float | None = None,
     run: Mapping[str, npt.ArrayLike] | None = None,
 ) -> WeakConfig:
-    """Settings ready for the engine: the guesses, their standard deviations and bounds, defaults of trust and gate.
+    """Settings ready for the identifier: the guesses, their standard deviations and bounds, defaults of trust and gate.
 
     Parameters
     ----------

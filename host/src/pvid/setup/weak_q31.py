@@ -1,4 +1,4 @@
-"""Settings of the fixed-point weak engine for a rig: formats of its rows from those of a run, start and bounds."""
+"""Settings of the fixed-point weak identifier for a rig: formats of its rows from those of a run, start and bounds."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def config_of_q31(
     start: Float | None = None,
     overlap: float = 1.0,
 ) -> WeakConfigQ31:
-    """Settings ready for the engine: the guesses, their standard deviations and bounds.
+    """Settings ready for the identifier: the guesses, their standard deviations and bounds.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which PVID_MAX_ sizes of the core a model and a design of the weak engine need."""
+"""Which PVID_MAX_ sizes of the core a model and a design of the weak identifier need."""
 
 from __future__ import annotations
 

@@ -41,13 +41,13 @@ def _public(room: str, core: str) -> list[str]:
 
 def printed(sources: ModelSources) -> ModuleType:
     """The printed module of a mechanism's core: the public functions of its identifier and what they need."""
-    core, room = sources.engine.name, sources.engine.room
+    core, room = sources.build.name, sources.build.room
     roots = [*_public(room, core), f"pvid_fnv_estimator_{core}"]
     if sources.refined:
         roots += [*_public("refine", "f32"), "pvid_refiner_f32", "pvid_fnv_refine_f32"]
     roots += [f"{sources.name}_{room}_{core}", f"{sources.name}_settings_{core}", f"{sources.name}_config_{core}"]
     macros = {name: str(value) for name, value in sources.sizes.items()}
-    return printed_module(core_of(sources.engine, sources.refined), [*FOLDERS, NATIVE], macros, roots, sources.texts)
+    return printed_module(core_of(sources.build, sources.refined), [*FOLDERS, NATIVE], macros, roots, sources.texts)
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class PrintedTwin:
     def __init__(
         self, sources: ModelSources, config: Any, refine: RefineConfig | None = None, start: Sequence[int] | None = None
     ) -> None:
-        self._core = core = sources.engine.name
+        self._core = core = sources.build.name
         self.module = module = printed(sources)
         self.fixed = core == "q31"
         kind = f"pvid_weak_config_{core}"

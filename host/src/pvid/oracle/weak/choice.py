@@ -198,7 +198,7 @@ def ranked(
     Parameters
     ----------
     equation_error : as in `chosen`
-    reversals : how signs are summed; "averaged": of the weak engine in C, which whitens the kinds of rows one by one
+    reversals : how signs are summed; "averaged": of the weak form in C, which whitens the kinds of rows one by one
     """
     found = _ranked(model, run, sample_rate, start, equation_error, reversals, (_FEWEST_WINDOWS, _SHORT_RUN))
     if found[0].near_0:  # a logarithm that ran down may have lost its way in windows that are too short
@@ -289,7 +289,7 @@ def _least_smoothed(tried: Sequence[Scored]) -> Scored:
     return min(filter(is_alike, tried), key=lambda one: one.design.rate_taps)
 
 
-def ranked_for_engine(model: Compiled, tried: Sequence[Scored]) -> list[Scored] | None:
+def ranked_for_core(model: Compiled, tried: Sequence[Scored]) -> list[Scored] | None:
     """What `ranked` finds with averaged signs, from what it has found with located ones, all else at its default; None
     where signs make a difference."""
     if model.channels.signs:

@@ -423,7 +423,7 @@ def online(rows: WeakRows, start: Float | None = None, equation_error: bool = Tr
     """p after each window [windows, n_p]: every window whitened at the p of its moment, three steps each.
 
     The sums of rows that were whitened at a poor p weigh wrongly. Here all rows are whitened anew when their number is
-    a power of two, and again until p stays: three steps from a start that is 50 % off are too few. An engine that keeps
+    a power of two, and again until p stays: three steps from a start that is 50 % off are too few. A core that keeps
     no rows lets its first sums fade instead. NaN from the window on at which numbers run away.
     """
     history = np.full((rows.windows, len(rows.compiled.parameters.names)), np.nan)

@@ -1,4 +1,4 @@
-"""What one build of the core shows of the weak engine, in float32 with its second stage and in fixed point, with the
+"""What one build of the core shows of the weak form, in float32 with its second stage and in fixed point, with the
 generated C of shipped mechanisms, as one number a variant.
 
 tools/mutate.py plays it: a change of the core shows, or not. The bits of the core as it is are compared with the numpy
@@ -20,9 +20,9 @@ import numpy.typing as npt
 
 from pvid.board.refined_image import RefinedRun, refined_run
 from pvid.codegen.weak_library import weak_native, weak_native_q31
-from pvid.codegen.weak_q31 import FixedEngine
+from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.weak import simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.core import snapshot
 from pvid.core.model_library import core_of
 from pvid.core.native import Publisher
@@ -54,7 +54,7 @@ PIECES = 5  # of a run: between two of them everything is looked at
 
 
 class Subject(Protocol):
-    """A mechanism's engine in one core."""
+    """A mechanism's identifier in one core."""
 
     @property
     def name(self) -> str: ...
@@ -131,7 +131,7 @@ def wrong(samples: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class BothStages:
-    """Weak engine and refinement in float32."""
+    """Weak identifier and refinement in float32."""
 
     mechanism: str
     run: RefinedRun
@@ -204,10 +204,10 @@ class BothStages:
 
 @dataclass(frozen=True)
 class InFixedPoint:
-    """Weak engine in fixed point."""
+    """Weak identifier in fixed point."""
 
     mechanism: str
-    engine: FixedEngine
+    weak: WeakQ31
     native: WeakNativeQ31
     counts: npt.NDArray[np.int32]
 
@@ -215,10 +215,10 @@ class InFixedPoint:
     def of(mechanism: str) -> InFixedPoint:
         """The shipped rig; estimates are published from the first window on."""
         compiled = compiled_of(mechanism)
-        engine = engine_for_simulated_rig(compiled)
-        trust = replace(engine.config.trust, groups_min=1, se_max=2**31 - 1)
-        native = weak_native_q31(engine.made, engine.parameters, replace(engine.config, trust=trust))
-        return InFixedPoint(mechanism, engine, native, engine.counts_of(simulated_run_of(compiled)[0])[:TICKS])
+        weak = weak_q31_for_simulated_rig(compiled)
+        trust = replace(weak.config.trust, groups_min=1, se_max=2**31 - 1)
+        native = weak_native_q31(weak.made, weak.parameters, replace(weak.config, trust=trust))
+        return InFixedPoint(mechanism, weak, native, weak.counts_of(simulated_run_of(compiled)[0])[:TICKS])
 
     @property
     def name(self) -> str:
@@ -230,8 +230,8 @@ class InFixedPoint:
 
     @property
     def definitions(self) -> tuple[str, ...]:
-        model = self.engine.parameters.model
-        return defined(roomy(sizes_of_q31(self.engine.config.design, model.n_p, len(model.c_row))))
+        model = self.weak.parameters.model
+        return defined(roomy(sizes_of_q31(self.weak.config.design, model.n_p, len(model.c_row))))
 
     @property
     def sources(self) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Front end, sums and white columns of the fixed-point weak engine beside the float64 oracle; no count overflows."""
+"""Front end, sums and white columns of the fixed-point weak form beside the float64 oracle; no count overflows."""
 
 from __future__ import annotations
 

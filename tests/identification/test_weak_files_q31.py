@@ -11,7 +11,7 @@ import pytest
 from pvid.codegen import files_weak_q31
 from pvid.codegen.build import files_of
 from pvid.codegen.generated import GeneratedModel, Options
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.core.sources import PUBLIC_INCLUDES
 from pvid.models.mechanisms import compiled_of
 
@@ -32,7 +32,7 @@ pvid_reason step(const int32_t reading[])
 
 @pytest.fixture(scope="module")
 def files() -> dict[str, str]:
-    return files_weak_q31.files_of(engine_for_simulated_rig(compiled_of("rigid_body")), "a test")
+    return files_weak_q31.files_of(weak_q31_for_simulated_rig(compiled_of("rigid_body")), "a test")
 
 
 def test_they_compile_without_a_warning_and_contain_no_float(files: dict[str, str], tmp_path: Path) -> None:
@@ -55,7 +55,7 @@ def test_the_header_has_counts_and_formats_in_words(files: dict[str, str]) -> No
 
 
 def test_they_belong_to_the_folder_of_a_model(files: dict[str, str]) -> None:
-    options = Options(fixed_engine=engine_for_simulated_rig(compiled_of("rigid_body")))
+    options = Options(weak_q31_for_run=weak_q31_for_simulated_rig(compiled_of("rigid_body")))
     whole = files_of(GeneratedModel(compiled_of("rigid_body"), "a test", options))
     assert set(files) < set(whole)
     target = re.search(r"add_library\(rigid_body STATIC (.*)\)", whole["CMakeLists.txt"])
@@ -65,7 +65,7 @@ def test_they_belong_to_the_folder_of_a_model(files: dict[str, str]) -> None:
 
 def test_a_measured_drive_has_a_least_deviation_in_counts() -> None:
     """That of float32, of the pendulum's pivot alone: its angle may stand still."""
-    config = engine_for_simulated_rig(compiled_of("kapitza")).config
+    config = weak_q31_for_simulated_rig(compiled_of("kapitza")).config
     assert config.drive_min is not None
     y, phi = config.drive_min
     assert y > 0 and phi == 0

@@ -1,4 +1,4 @@
-"""What a snapshot of the weak engine must contain and refuse, from the headers: pointers of the state, fields of the
+"""What a snapshot of the weak form must contain and refuse, from the headers: pointers of the state, fields of the
 configuration with all tables that it points to."""
 
 from __future__ import annotations
@@ -139,8 +139,8 @@ class Copied:
                 self.numbers.append(Scalar(f"{whole}[{k}]", item, table, k))
 
 
-class Engine:
-    """An identifier of the weak engine of either core, by its functions in C.
+class Identifier:
+    """An identifier of the weak identifier of either core, by its functions in C.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def refusal(name: str) -> SnapshotStatus:
     return SnapshotStatus.OTHER_DESIGN if name.startswith("design.") else SnapshotStatus.OTHER_CONFIG
 
 
-def assert_continues_from_every_tick(one: Engine, other: Engine, samples: Any) -> None:
+def assert_continues_from_every_tick(one: Identifier, other: Identifier, samples: Any) -> None:
     """Asserts that after each tick `other` continues as `one` from a snapshot, byte for byte."""
     for tick in range(len(samples)):
         image = one.save()
@@ -219,7 +219,7 @@ def assert_continues_from_every_tick(one: Engine, other: Engine, samples: Any) -
         assert other.save() == one.save(), tick
 
 
-def assert_every_change_is_refused(one: Engine) -> None:
+def assert_every_change_is_refused(one: Identifier) -> None:
     """Asserts that a snapshot is refused for another value of any number of the configuration, and changes nothing."""
     copied = one.copied()
     image, before, seen = one.save(), bytes(one.memory), set()
@@ -236,7 +236,7 @@ def assert_every_change_is_refused(one: Engine) -> None:
     assert bytes(one.memory) == before and one.restore(image) is SnapshotStatus.RESTORED
 
 
-def assert_every_function_is_hashed(one: Engine, signature: str, result: Any) -> None:
+def assert_every_function_is_hashed(one: Identifier, signature: str, result: Any) -> None:
     """Asserts that a model with the same tables and a function of other results is another model."""
     copied = one.copied()
     image, model = one.save(), copied.pointer.design.model
@@ -249,7 +249,7 @@ def assert_every_function_is_hashed(one: Engine, signature: str, result: Any) ->
     assert one.restore(image) is SnapshotStatus.RESTORED
 
 
-def assert_every_byte_is_kept(one: Engine, other: Engine) -> list[int]:
+def assert_every_byte_is_kept(one: Identifier, other: Identifier) -> list[int]:
     """Asserts that every byte is saved and restored but those of pointers; returns those that restore has set."""
     size = one.ffi.sizeof("void *")
     found = sorted(set(pointer_places(one.ffi, one.ffi.typeof(one.type))))  # parts of a union share theirs

@@ -37,7 +37,7 @@ def verify_recording(
     Raises
     ------
     PvidError
-        When the target cannot be started or refuses, or the engine does not have what the model needs.
+        When the target cannot be started or refuses, or the identifier does not have what the model needs.
     """
     if refined:
         refuse_unrefined(core)

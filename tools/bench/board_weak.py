@@ -1,4 +1,4 @@
-"""The weak engine as a board has it: its settings are made once for a rig, then it runs from any start."""
+"""The weak identifier as a board has it: its settings are made once for a rig, then it runs from any start."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen.weak_library import weak_native, weak_native_q31
-from pvid.codegen.weak_q31 import FixedEngine
-from pvid.configuration.weak import engine_config, samples_of
-from pvid.configuration.weak_q31 import fixed_engine, with_neglected
+from pvid.codegen.weak_q31 import WeakQ31
+from pvid.configuration.weak import samples_of, weak_config
+from pvid.configuration.weak_q31 import weak_q31_for_run, with_neglected
 from pvid.core.native import Publisher
 from pvid.core.weak_native import WeakIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
@@ -67,8 +67,8 @@ class Answer:
         return Reason(int(ends[-1])) if len(ends) else Reason.WARMING_UP
 
 
-class BoardEngine(Protocol):
-    """An arithmetic of the engine."""
+class BoardWeak(Protocol):
+    """An arithmetic of the identifier."""
 
     def answer(self, run: Signals, start: Float) -> Answer:
         """Steps through a run from a start [n_p]."""
@@ -112,16 +112,16 @@ class FloatBoard:
 class FixedBoard:
     """In fixed point."""
 
-    engine: FixedEngine
+    weak: WeakQ31
 
     @cached_property
     def library(self) -> WeakNativeQ31:
         """Of the mechanism with its settings."""
-        return weak_native_q31(self.engine.made, self.engine.parameters, self.engine.config)
+        return weak_native_q31(self.weak.made, self.weak.parameters, self.weak.config)
 
     def config_from(self, start: Float) -> WeakConfigQ31:
         """With another start [n_p]."""
-        config, integers = self.engine.config, tuple(self.engine.integers(start).tolist())
+        config, integers = self.weak.config, tuple(self.weak.integers(start).tolist())
         return replace(config, estimator=replace(config.estimator, start=integers))
 
     def identifier(self, start: Float) -> WeakIdentifierQ31:
@@ -130,15 +130,15 @@ class FixedBoard:
 
     def samples(self, run: Signals) -> npt.NDArray[np.int32]:
         """As `step` takes them [ticks, samples]."""
-        return self.engine.counts_of(run)
+        return self.weak.counts_of(run)
 
     def answer(self, run: Signals, start: Float) -> Answer:
         """Steps through a run from a start [n_p]."""
         identifier = self.identifier(start)
         record = identifier.run_samples(self.samples(run), sums=False, hashes=False)
-        p, se = map(self.engine.values, _published(identifier, record))
+        p, se = map(self.weak.values, _published(identifier, record))
         correlation = identifier.estimate["correlation"][: len(p), : len(p)] * 2.0**-30
-        values = self.engine.values
+        values = self.weak.values
         return Answer(p, se, correlation, values(record.published), values(record.published_se), record.reason)
 
 
@@ -152,6 +152,6 @@ def board_of(
 ) -> FloatBoard | FixedBoard:
     """Settings from a run of the rig, at parameters near its own [n_p]; neglected: as in trust.h."""
     if core == "q31":
-        return FixedBoard(with_neglected(fixed_engine(compiled, run, design, p), neglected))
-    config = engine_config(compiled, run, design, p)
+        return FixedBoard(with_neglected(weak_q31_for_run(compiled, run, design, p), neglected))
+    config = weak_config(compiled, run, design, p)
     return FloatBoard(compiled, replace(config, trust=replace(config.trust, neglected=neglected)))

@@ -12,13 +12,13 @@ import numpy.typing as npt
 from bench.mechanisms import design_of, size_of, start_of
 from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native, weak_native_q31
-from pvid.configuration.weak import engine_config, samples_of
-from pvid.configuration.weak_q31 import fixed_engine
+from pvid.configuration.weak import samples_of, weak_config
+from pvid.configuration.weak_q31 import weak_q31_for_run
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import batch
-from pvid.setup.weak import config_of, design_tables, for_engine
+from pvid.setup.weak import config_of, design_tables, for_core
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 
@@ -30,12 +30,12 @@ HEADER = (
     "functions",
     "runs",
     "published",
-    "RMS % of the engine",
+    "RMS % of the identifier",
     "of the oracle",
     "largest ratio: of",
     "ratio",
     "started at the truth",
-    "engine - oracle, s.e.: RMS",
+    "identifier - oracle, s.e.: RMS",
     "largest",
 )
 
@@ -61,14 +61,14 @@ class Errors:
 
     Attributes
     ----------
-    engine, oracle : errors over the parameters' sizes [runs, n_p]
-    from_truth : of the engine that starts at the truth [runs, n_p]
-    apart : engine less oracle in standard errors that the oracle predicts [runs, n_p]
-    published : runs in which the engine published
+    weak, oracle : errors over the parameters' sizes [runs, n_p]
+    from_truth : of the identifier that starts at the truth [runs, n_p]
+    apart : identifier less oracle in standard errors that the oracle predicts [runs, n_p]
+    published : runs in which the identifier published
     functions : K
     """
 
-    engine: Float
+    weak: Float
     oracle: Float
     from_truth: Float
     apart: Float
@@ -76,11 +76,11 @@ class Errors:
     functions: int
 
     def ratios(self) -> Float:
-        """RMS error of the engine over that of the oracle [n_p]."""
-        return np.asarray(rms(self.engine) / rms(self.oracle))
+        """RMS error of the identifier over that of the oracle [n_p]."""
+        return np.asarray(rms(self.weak) / rms(self.oracle))
 
     def ratios_from_truth(self) -> Float:
-        """The same of the engine that starts at the truth: without windows that are weighted at a wrong p [n_p]."""
+        """The same of the identifier that starts at the truth: without windows that are weighted at a wrong p [n_p]."""
         return np.asarray(rms(self.from_truth) / rms(self.oracle))
 
 
@@ -104,9 +104,9 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] = lambda: N
     simulation = simulation_of(case.name)
     compiled = simulation.model
     made, model = ready(compiled), weak_model_of(compiled)
-    design = for_engine(design_of(simulation, case.law))
+    design = for_core(design_of(simulation, case.law))
     tables: Any = None
-    engine, oracle, from_truth, apart, published = [], [], [], [], 0
+    weak, oracle, from_truth, apart, published = [], [], [], [], 0
     for seed in range(seeds):
         run, start = simulation.run(seed, case.law), start_of(simulation, seed)
         rows = WeakRows.of(made, run, design)
@@ -116,20 +116,18 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] = lambda: N
         used = core.counters["rows"] // (design.functions * rows.kinds)
         fit = batch(rows.only(slice(0, used)) if used else rows, start, equation_error=False)
         size = size_of(simulation)
-        engine.append((p - simulation.truth) / size)
+        weak.append((p - simulation.truth) / size)
         _, q = _ran(compiled, config, run, np.asarray(simulation.truth), tables)
         from_truth.append((q - simulation.truth) / size)
         oracle.append((fit.p - simulation.truth) / size)
         apart.append((p - fit.p) / uncertainty(fit).predicted)
         published += core.is_published
         progress()
-    return Errors(
-        np.array(engine), np.array(oracle), np.array(from_truth), np.array(apart), published, design.functions
-    )
+    return Errors(np.array(weak), np.array(oracle), np.array(from_truth), np.array(apart), published, design.functions)
 
 
 def _ran(compiled: Any, config: Any, run: Any, begin: Float, tables: Any) -> tuple[Any, Float]:
-    """The engine after a run from a start, and its p."""
+    """The identifier after a run from a start, and its p."""
     own = replace(config.estimator, start=np.clip(begin, config.estimator.lower, config.estimator.upper))
     core = weak_native(compiled, tables).identifier_of(replace(config, estimator=own))
     record = core.run_samples(samples_of(config, run), sums=False, hashes=False)
@@ -144,9 +142,9 @@ def row_of(case: Case, found: Errors) -> tuple[str, ...]:
         case.name,
         case.friction,
         str(found.functions),
-        str(len(found.engine)),
+        str(len(found.weak)),
         str(found.published),
-        f"{100 * np.sqrt(np.mean(found.engine**2)):.3g}",
+        f"{100 * np.sqrt(np.mean(found.weak**2)):.3g}",
         f"{100 * np.sqrt(np.mean(found.oracle**2)):.3g}",
         simulation_of(case.name).model.p_names[worst],
         f"{ratios[worst]:.3f}",
@@ -204,17 +202,17 @@ def fixed_errors_of(case: Case, seeds: int, progress: Callable[[], object] = lam
     design = design_of(simulation, case.law)
     truth = np.asarray(simulation.truth)
     first = simulation.run(0, case.law)
-    engine = fixed_engine(simulation.model, first, design, truth)
-    library = weak_native_q31(engine.made, engine.parameters, engine.config)
-    config = engine_config(simulation.model, first, design, truth)
-    start = engine.values(engine.config.estimator.start).astype(np.float32)
+    weak = weak_q31_for_run(simulation.model, first, design, truth)
+    library = weak_native_q31(weak.made, weak.parameters, weak.config)
+    config = weak_config(simulation.model, first, design, truth)
+    start = weak.values(weak.config.estimator.start).astype(np.float32)
     config = replace(config, estimator=replace(config.estimator, start=start))
     fixed, floating, apart, published = [], [], [], np.zeros(2, np.int64)
     for seed in range(seeds):
-        counts = engine.counts_of(simulation.run(seed, case.law))
-        run = dict(zip(engine.sample_names, (counts * np.array(engine.lsb)).T, strict=True))
+        counts = weak.counts_of(simulation.run(seed, case.law))
+        run = dict(zip(weak.sample_names, (counts * np.array(weak.lsb)).T, strict=True))
         mine = library.identifier()
-        p = engine.values(mine.run_samples(counts, sums=False, hashes=False).p[-1])
+        p = weak.values(mine.run_samples(counts, sums=False, hashes=False).p[-1])
         theirs = weak_native(simulation.model, config.design).identifier_of(config)
         other = theirs.run_samples(samples_of(config, run), sums=False, hashes=False).p[-1].astype(np.float64)
         se = np.asarray(theirs.estimate["se"], np.float64)[: len(truth)]
@@ -224,7 +222,7 @@ def fixed_errors_of(case: Case, seeds: int, progress: Callable[[], object] = lam
         published += (mine.is_published, theirs.is_published)
         progress()
     both = (int(published[0]), int(published[1]))
-    return FixedErrors(np.array(fixed), np.array(floating), np.array(apart), both, engine.config.design.functions)
+    return FixedErrors(np.array(fixed), np.array(floating), np.array(apart), both, weak.config.design.functions)
 
 
 def fixed_row_of(case: Case, found: FixedErrors) -> tuple[str, ...]:

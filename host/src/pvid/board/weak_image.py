@@ -1,4 +1,4 @@
-"""The replay image of the weak engine with a shipped mechanism, in either arithmetic, on a run long enough to count."""
+"""The replay image of the weak form with a shipped mechanism, in either arithmetic, on a run long enough to count."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pvid.settings.enums import Core
 
 
 @dataclass(frozen=True)
-class EngineImage:
+class WeakImage:
     """An image that is built.
 
     Attributes
@@ -29,7 +29,7 @@ class EngineImage:
     measure_from: int
 
 
-def engine_image(board: Board, model: str, core: Core) -> EngineImage:
+def weak_image(board: Board, model: str, core: Core) -> WeakImage:
     """Builds it for a board.
 
     Raises
@@ -40,14 +40,14 @@ def engine_image(board: Board, model: str, core: Core) -> EngineImage:
     return _IMAGES[core](board, model)
 
 
-def _in_float(board: Board, model: str) -> EngineImage:
+def _in_float(board: Board, model: str) -> WeakImage:
     run = mechanism_run(model, long=True)
-    return EngineImage(*build_mechanism_image(board, run), run.name, run.measure_from)
+    return WeakImage(*build_mechanism_image(board, run), run.name, run.measure_from)
 
 
-def _in_fixed_point(board: Board, model: str) -> EngineImage:
+def _in_fixed_point(board: Board, model: str) -> WeakImage:
     run = fixed_run(model, long=board.toolchain != "avr")  # which has no larger arrays than 32 kB
-    return EngineImage(*build_fixed_image(board, run), run.name, run.measure_from)
+    return WeakImage(*build_fixed_image(board, run), run.name, run.measure_from)
 
 
 _IMAGES = dict(zip(CORES, (_in_float, _in_fixed_point), strict=True))
