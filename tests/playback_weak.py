@@ -21,6 +21,7 @@ import numpy.typing as npt
 from pvid.board.refined_image import RefinedRun, refined_run
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.codegen.weak_q31 import WeakQ31
+from pvid.codegen.weak_sizes import sizes_of_design, sizes_of_q31
 from pvid.configuration.weak import simulated_run_of
 from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.core import snapshot
@@ -33,7 +34,6 @@ from pvid.models.mechanisms import compiled_of
 from pvid.settings.cores import FIXED, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.parts import GateConfig, TrustConfig
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
 
 # Steps of Runge-Kutta but for those of the pendulum and the rigid body, which are Adams's.
 BOTH_STAGES = (

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native
+from pvid.configuration.weak_tables import circle_of, config_of, design_tables, for_core
 from pvid.core.weak_native import WeakIdentifier, WeakNative
 from pvid.models import mechanisms
 from pvid.models.simulated_rig import simulated_rig
@@ -21,7 +22,6 @@ from pvid.oracle.weak.rows import WeakRows
 from pvid.settings.parts import EstimatorConfig
 from pvid.settings.record import Record
 from pvid.settings.weak import WeakConfig
-from pvid.setup.weak import circle_of, config_of, design_tables, for_core
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 from pvid.twin.printed import PrintedTwin
 

@@ -13,6 +13,8 @@ import numpy.typing as npt
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of, weak_model_of
 from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_parameters, fixed_weak
+from pvid.configuration.weak_formats_q31 import config_of_q31, row_formats
+from pvid.configuration.weak_tables import design_tables, for_core
 from pvid.core.sources import INCLUDES, sources_of
 from pvid.design.weak_q31 import Sensing, fixed_design
 from pvid.models.mechanisms import compiled_of
@@ -23,8 +25,6 @@ from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows, record_of
 from pvid.settings.weak import Source
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
-from pvid.setup.weak import design_tables, for_core
-from pvid.setup.weak_q31 import config_of_q31, row_formats
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
 

@@ -22,6 +22,7 @@ from pvid.codegen.fixed_model import Reaches
 from pvid.codegen.generated import GeneratedModel, Options
 from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_sizes import sizes_of_design
 from pvid.configuration.refine import refine_design, refine_settings
 from pvid.configuration.strong import strong_design
 from pvid.configuration.strong_q31 import fixed_design
@@ -34,7 +35,6 @@ from pvid.model import Integral, Model
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.run import Recording
-from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import simulation_of
 
 USER = """

@@ -11,13 +11,13 @@ from weak_forms import NAMES, WeakForm, weak_form
 from pvid.base.errors import PvidError
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak import weak_functions_of
+from pvid.configuration.weak_tables import config_of, design_tables, for_core
 from pvid.model import Integral, Model
 from pvid.oracle.weak.channels import running_integrals
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.reversals import averaged
 from pvid.settings.weak import NONE, Source
-from pvid.setup.weak import config_of, design_tables, for_core
 
 Complex = npt.NDArray[np.complex128]
 

@@ -7,6 +7,8 @@ from functools import cache
 
 from pvid.codegen import files_weak
 from pvid.codegen.weak import WeakFunctions, weak_functions_of, weak_model_of
+from pvid.codegen.weak_sizes import sizes_of_design
+from pvid.configuration.weak_tables import config_of, design_tables, for_core
 from pvid.core.model_library import ModelSources
 from pvid.core.sizes import raised
 from pvid.core.weak_native import WeakNative
@@ -17,8 +19,6 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.settings.weak import WeakConfig, WeakModel
-from pvid.setup.weak import config_of, design_tables, for_core
-from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
 
 NAMES = mechanisms.names()

@@ -7,11 +7,11 @@ import pytest
 from weak_rig import weak_rig
 
 from pvid.base.errors import PvidError
+from pvid.configuration.weak_tables import design_tables
 from pvid.oracle.weak import rows
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.solve import batch
-from pvid.setup.weak import design_tables
 
 # In standard errors. The identifier weighs the rows of its first windows at a poor p, the oracle all at the last one.
 CLOSE = 0.1

@@ -14,7 +14,7 @@ SOURCE = ROOT / "host" / "src"
 
 # Each imports from itself and from those before it.
 ORDER = """
-base settings model models core rig sim design oracle setup twin codegen link configuration compare
+base settings model models core rig sim design oracle twin codegen link configuration compare
 deploy board log identification show api fleet cli
 """.split()
 

@@ -13,11 +13,11 @@ from weak_rig_q31 import DESIGNS, Int, Rig, rig
 
 from pvid.base.errors import PvidError
 from pvid.codegen.weak_library import weak_native_q31
+from pvid.configuration.weak_formats_q31 import row_formats
 from pvid.design.weak_q31 import scaled_number
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import GateConfigQ31
 from pvid.settings.weak_q31 import WeakConfigQ31
-from pvid.setup.weak_q31 import row_formats
 from pvid.twin.printed import PrintedTwin
 
 TICKS = 3000

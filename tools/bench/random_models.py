@@ -33,6 +33,7 @@ from pvid.cli.identify_run import recording_of
 from pvid.codegen.build import build
 from pvid.codegen.generated import GeneratedModel, Options
 from pvid.codegen.weak_q31 import WeakQ31
+from pvid.codegen.weak_sizes import refuse_too_many_unknowns
 from pvid.compare.bits import Comparison
 from pvid.compare.weak import compare_recording
 from pvid.configuration.refine import refine_design
@@ -57,7 +58,6 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.enums import Core
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
-from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 HEADER = (
     "kind",

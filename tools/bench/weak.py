@@ -14,11 +14,11 @@ from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.weak import samples_of, weak_config
 from pvid.configuration.weak_q31 import weak_q31_for_run
+from pvid.configuration.weak_tables import config_of, design_tables, for_core
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import batch
-from pvid.setup.weak import config_of, design_tables, for_core
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 

@@ -22,6 +22,7 @@ from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions, refine_functions, widths
 from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native, weak_sources
+from pvid.codegen.weak_sizes import sizes_of_design
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.refine import full_motion_of, refine_design
 from pvid.configuration.weak import (
@@ -52,7 +53,6 @@ from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.refine import RefineConfig, RefineSignal
 from pvid.settings.weak import Source as SignalSource
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise
-from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.printed import PrintedTwin
 

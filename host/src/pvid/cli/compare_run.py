@@ -11,13 +11,13 @@ from pvid.board.compare_on import Outcome
 from pvid.board.strong_image import compare_on_board
 from pvid.board.verify_board import verify_recording
 from pvid.cli.identify_run import IN_C, LAWS, STRONG_FORM, recording_of
+from pvid.codegen.weak_sizes import refuse_too_many_unknowns
 from pvid.compare.bits import Comparison
 from pvid.compare.strong import StrongComparison
 from pvid.compare.weak import compare_recording as compared
 from pvid.identification.core_refined import compare_both
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.cores import CORES, FLOAT, STRONG, STRONG_CORES
-from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 
 def compare_recording(

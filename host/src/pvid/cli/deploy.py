@@ -82,13 +82,13 @@ def _deployment(
     functions: int | None,
     title: str,
 ) -> Deployment:
+    from pvid.codegen.weak_sizes import refuse_too_many_unknowns
     from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
     from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
     from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_rig_like_the_shipped
     from pvid.deploy.of_rig import deployment_f32, deployment_q31
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.oracle.weak.edges import with_edges
-    from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     refuse_too_many_unknowns(compiled)

@@ -18,6 +18,7 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.base.wording import listed
 from pvid.cli.input import print_notes
+from pvid.codegen.weak_sizes import refuse_too_many_unknowns
 from pvid.identification.analysis import analysed, own_of
 from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.reading import read_all
@@ -29,7 +30,6 @@ from pvid.rig.run import Recording
 from pvid.rig.together import names_of
 from pvid.settings.cores import CORES, FLOAT, STRONG
 from pvid.settings.enums import Core, Law
-from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 if TYPE_CHECKING:
     from pvid.identification.core import CoreAnswer

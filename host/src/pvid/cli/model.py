@@ -48,10 +48,10 @@ def check(model: str) -> int:
 
     Exit code 3: a parameter is not identifiable; the report names the combination that is.
     """
+    from pvid.codegen.weak_sizes import too_many_unknowns
     from pvid.model.report import check_report, identifiable
     from pvid.models.mechanisms import compiled_of
     from pvid.models.registry import asked_for
-    from pvid.setup.weak_sizes import too_many_unknowns
 
     compiled = compiled_of(asked_for(model))
     if (refusal := too_many_unknowns(compiled.name, len(compiled.unknowns))) is not None:
@@ -186,8 +186,8 @@ def build(
     from pvid.codegen import build as generated
     from pvid.codegen.fixed_model import Reaches
     from pvid.codegen.generated import GeneratedModel, Options
+    from pvid.codegen.weak_sizes import refuse_too_many_unknowns
     from pvid.oracle.weak.edges import with_edges
-    from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     refuse_too_many_unknowns(compiled)

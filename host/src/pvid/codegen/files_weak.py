@@ -16,14 +16,13 @@ from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.functions import Function
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak import WeakFunctions
+from pvid.codegen.weak_sizes import sizes_of_design, sizes_of_model
 from pvid.core.sizes import raised, smallest
 from pvid.design.c_tables import float_literal
 from pvid.model.compiled import CompiledModel
 from pvid.settings.enums import Law
 from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import NONE, Float32, Source, WeakConfig, WeakDesign32, WeakModel
-from pvid.setup.weak import with_soft_signs
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 
 _SOURCES = {Source.SAMPLED: "", Source.HELD: "held until the next", Source.JUMP: "", Source.LAST: ""}
 
@@ -45,7 +44,7 @@ def printed_design(model: GeneratedModel) -> dict[str, str]:
     options, compiled, name = model.options, model.compiled, model.name
     if options.design is None or model.weak.made is None:
         return {}
-    design = with_soft_signs(options.design, options.soft_signs)
+    design = replace(options.design, design=options.design.design.with_soft_widths(options.soft_signs))
     return {
         f"{name}_design_f32.h": design_header(design, compiled, model.command),
         f"{name}_config.h": config_header(f"{name}_config", fitted_sizes(design), model.command),
@@ -57,7 +56,7 @@ def header(made: WeakFunctions, model: WeakModel, needed: Mapping[str, int], com
 
     Parameters
     ----------
-    needed : sizes of the core that the model needs (pvid.setup.weak_sizes)
+    needed : sizes of the core that the model needs (pvid.codegen.weak_sizes)
     """
     name, upper = made.name, made.name.upper()
     about = [

@@ -12,11 +12,11 @@ from pvid.codegen.files_weak import size_check
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak_q31 import FixedWeak, ParametersQ31, WeakQ31
+from pvid.codegen.weak_sizes import sizes_of_q31
 from pvid.core.sizes import smallest
 from pvid.settings.parts import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak import NONE
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
-from pvid.setup.weak_sizes import sizes_of_q31
 
 _WIDTH = 12  # numbers a line
 
@@ -62,7 +62,7 @@ def header(made: FixedWeak, needed: Mapping[str, int], command: str) -> str:
 
     Parameters
     ----------
-    needed : sizes of the core that the model needs (pvid.setup.weak_sizes)
+    needed : sizes of the core that the model needs (pvid.codegen.weak_sizes)
     """
     own = made.functions
     name = own.name

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from pvid.codegen.c_text import guarded
+from pvid.codegen.weak_sizes import sizes_of_design, sizes_of_q31
+from pvid.codegen.weak_stages import shares_place, shares_place_q31
 from pvid.core.sizes import smallest
 from pvid.settings.enums import Law
 from pvid.settings.weak import NONE, WeakChannel, WeakConfig
 from pvid.settings.weak_q31 import WeakConfigQ31
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
-from pvid.setup.weak_stages import shares_place, shares_place_q31
 
 
 def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]:

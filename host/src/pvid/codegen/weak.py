@@ -19,6 +19,7 @@ from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.codegen.functions import Function, ModelFunctions, functions_of, identifiers
 from pvid.codegen.operations import program_of
+from pvid.codegen.weak_sizes import refuse_too_many_unknowns, sizes_of_model
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import OfInput
 from pvid.model.signals import Integral, Jet, jets
@@ -35,7 +36,6 @@ from pvid.settings.weak import (
     WeakSignal,
     WeakTerm,
 )
-from pvid.setup.weak_sizes import refuse_too_many_unknowns, sizes_of_model
 
 _ONE = sp.Integer(1)
 _HIGHEST_FOLD = 2

@@ -6,6 +6,7 @@ from pvid.codegen import files_refine, files_weak, files_weak_q31
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak_q31 import FixedWeak, ParametersQ31
+from pvid.codegen.weak_sizes import sizes_of_design, sizes_of_model, sizes_of_q31
 from pvid.core.model_library import ModelSources
 from pvid.core.sizes import roomy
 from pvid.core.weak_native import WeakNative
@@ -14,7 +15,6 @@ from pvid.model.compiled import CompiledModel
 from pvid.settings.cores import FIXED
 from pvid.settings.weak import WeakDesign32
 from pvid.settings.weak_q31 import WeakConfigQ31
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model, sizes_of_q31
 
 _MADE_BY = "identification"
 

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.codegen.weak_q31 import WeakQ31
+from pvid.codegen.weak_sizes import sizes_of_model
 from pvid.compare.bits import Comparison, first_difference
 from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.configuration.weak_q31 import weak_q31_to_identify
@@ -17,7 +18,6 @@ from pvid.rig.run import Recording
 from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 from pvid.settings.weak import WeakConfig
-from pvid.setup.weak_sizes import sizes_of_model
 from pvid.twin.printed import PrintedTwin
 
 Progress = Callable[[int], None]

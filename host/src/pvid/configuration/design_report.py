@@ -9,6 +9,7 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.configuration.weak import design_for_recording
+from pvid.configuration.weak_tables import for_core
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as names_of_shipped
 from pvid.models.simulated_rig import simulated_rig
@@ -16,7 +17,6 @@ from pvid.oracle.weak.choice import Scored, ranked, score_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import ready
 from pvid.rig.run import Recording
-from pvid.setup.weak import for_core
 from pvid.sim.simulated_run import RigSimulation
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.configuration.weak import design_for_recording
+from pvid.configuration.weak_tables import for_core
 from pvid.model.compiled import CompiledModel
 from pvid.models.drive import Sines
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
@@ -22,7 +23,6 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.setup.weak import for_core
 from pvid.sim.scaled_rig import ScaledRig, scaled_rig
 from pvid.sim.simulated_run import RigSimulation
 

@@ -13,6 +13,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.strong import StrongFunctions
 from pvid.codegen.strong_q31 import FixedStrong, StrongQ31, fixed_strong
 from pvid.configuration.strong import StrongDesign, strong_design
+from pvid.configuration.weak_formats_q31 import bits_of_row, start_q31
 from pvid.configuration.weak_q31 import FULL_SCALE, HIGHEST_JET, finer, lsb_of
 from pvid.design.bank_q31 import FULL_SCALE_LIMIT, HELD_MOST, HELD_UNITS, BankQ31, integer_bank
 from pvid.design.fir import FirBank, savitzky_golay
@@ -27,7 +28,6 @@ from pvid.settings.enums import Law
 from pvid.settings.parts import EstimatorConfigQ31
 from pvid.settings.strong import StrongModelConfigQ31
 from pvid.settings.weak_q31 import Rescale
-from pvid.setup.weak_q31 import bits_of_row, start_q31
 
 _MOST_Y_BITS = 12
 _LARGEST_BITS = 25  # of the largest term of a row over its noise, at most: smaller noise is set to that

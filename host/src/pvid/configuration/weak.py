@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.weak import weak_model_of
+from pvid.configuration.weak_tables import LONGEST_HOP, config_of, design_tables, for_core
 from pvid.model.compiled import CompiledModel
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import MODEL_ERROR, Scored, ranked, ranked_for_core, score_of
@@ -21,7 +22,6 @@ from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
 from pvid.rig.run import Recording
 from pvid.settings.weak import WeakConfig, WeakDesign32
-from pvid.setup.weak import LONGEST_HOP, config_of, design_tables, for_core
 from pvid.sim.simulated_run import RigSimulation
 
 Run = Mapping[str, npt.ArrayLike]

@@ -12,6 +12,8 @@ import numpy.typing as npt
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.codegen.weak_q31 import FixedWeak, JetReaches, ParametersQ31, WeakQ31, fixed_parameters, fixed_weak
 from pvid.configuration.weak import Run, design_and_p, neglected_part, simulated_run_of, weak_tables
+from pvid.configuration.weak_formats_q31 import config_of_q31, row_formats, with_noisy_means
+from pvid.configuration.weak_tables import drive_min_of
 from pvid.design.weak_q31 import Sensing, fixed_design, most_counts
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
@@ -21,8 +23,6 @@ from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.parameters import UNKNOWN, Parameters
 from pvid.rig.run import Recording
 from pvid.settings.weak_q31 import WeakConfigQ31
-from pvid.setup.weak import drive_min_of, with_soft_widths
-from pvid.setup.weak_q31 import config_of_q31, row_formats, with_noisy_means
 
 _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
 HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
@@ -82,7 +82,7 @@ def weak_q31_for_run(
     made = fixed_weak(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
     parameters_of = found.rows.compiled.parameters
     parameters = _parameters(functions, parameters_of)
-    sizes = with_noisy_means(with_soft_widths(found.tables, soft_signs or {}), found.rows, found.p)
+    sizes = with_noisy_means(found.tables.with_soft_widths(soft_signs or {}), found.rows, found.p)
     tables = fixed_design(made.model, sizes, Sensing(lsb, full_scale, design.sample_rate), made.formats)
     formats = row_formats(found.rows, found.p, found.errors)
     config = config_of_q31(

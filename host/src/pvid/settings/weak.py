@@ -5,7 +5,8 @@ Counts of tables are properties: what C has beside a pointer is the length of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import ClassVar
 
@@ -284,6 +285,11 @@ class WeakDesign32:
     def noise_of(self, kind: int) -> tuple[WeakNoise, ...]:
         """Entries of one kind."""
         return tuple(one for one in self.noise if one.kind == kind)
+
+    def with_soft_widths(self, widths: Mapping[str, float]) -> WeakDesign32:
+        """With soft signs v / (|v| + width) of some arguments, as in phi_1; the others keep theirs."""
+        own = zip(self.model.sign_names, self.sign_width, strict=True)
+        return replace(self, sign_width=np.array([widths.get(name, width) for name, width in own], np.float32))
 
 
 @dataclass(frozen=True, eq=False)

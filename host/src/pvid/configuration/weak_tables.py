@@ -88,17 +88,6 @@ def circle_of(hop: int) -> npt.NDArray[np.float32]:
     return _as_float32(np.sin(np.pi * np.arange(5 * hop // 2) / hop))
 
 
-def with_soft_signs(config: WeakConfig, widths: Mapping[str, float]) -> WeakConfig:
-    """The settings with soft signs v / (|v| + width) of some arguments, as in phi_1; the others keep theirs."""
-    return replace(config, design=with_soft_widths(config.design, widths))
-
-
-def with_soft_widths(design: WeakDesign32, widths: Mapping[str, float]) -> WeakDesign32:
-    """The same of a design."""
-    width = [widths.get(name, float(own)) for name, own in zip(design.model.sign_names, design.sign_width, strict=True)]
-    return replace(design, sign_width=_as_float32(width))
-
-
 def _check(design: WeakDesign, rows: WeakRows) -> None:
     name = rows.compiled.model.name
     if design.hop % _STEPS_OF_A_BLOCK or design.joint or design.reversals == "located":

@@ -1,1 +1,0 @@
-"""From a rig file to the settings of the core."""
