@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
 from dataclasses import dataclass
 from functools import cached_property
 from math import frexp
@@ -15,6 +14,7 @@ import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from pvid.board.replay_image import IN_FLASH
+from pvid.core.host_compiler import objects_of, run_compiler
 from pvid.core.sources import INCLUDES, sources_of
 from pvid.oracle.digits import Digits
 from pvid.oracle.paper import Fixed, Paper, Single
@@ -160,10 +160,13 @@ class PaperRun:
 def compile_with_core(core: Core, source: Path, target: Path, compiler: str, *options: str) -> None:
     """Of the core what the identifier needs, and `source`."""
     rooms = ("number", "solve", "strong", "keep")
-    sources = [str(path) for path in (source, *sources_of(core)) if path == source or path.parent.name in rooms]
+    sources = [path for path in (source, *sources_of(core)) if path == source or path.parent.name in rooms]
     sizes = [f"-D{name}={size}" for name, size in SIZES.items()]
-    command = [compiler, "-std=c99", "-O2", "-ffp-contract=off", *options, *INCLUDES, f"-I{HERE}", *sizes, *sources]
-    subprocess.run([*command, "-lm", "-o", str(target)], check=True)
+    how = ["-std=c99", "-O2", "-ffp-contract=off", *options, *INCLUDES, f"-I{HERE}", *sizes]
+    folder = target.with_name(f"{target.name}-objects")
+    folder.mkdir()
+    objects = objects_of(compiler, how, sources, folder)
+    run_compiler([compiler, *options, *objects, "-lm", "-o", str(target)])
 
 
 class KeepsRows(Single):
