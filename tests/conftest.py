@@ -13,6 +13,7 @@ from hypothesis import settings
 from pendulum_plant import Simulation, simulate, standard_sensors
 from processes import children_of
 
+from pvid.base.freed_memory import keep_freed
 from pvid.core.native import Native
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -68,6 +69,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    keep_freed()
     gc.set_threshold(50_000, 20, 100)  # modules and SymPy's expressions live to the end: 5 % of the time found nothing
     config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and in `pvid bench long`")
     config.addinivalue_line("markers", "long: in `pvid bench long` alone")

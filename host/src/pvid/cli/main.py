@@ -17,6 +17,7 @@ import click
 
 from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, OWN_ERROR, write_stderr
 from pvid.base.errors import PvidError
+from pvid.base.freed_memory import keep_freed
 from pvid.base.output import watch
 from pvid.base.packages import PACKAGES, installing
 from pvid.base.version import __version__
@@ -68,6 +69,7 @@ def main() -> None:
     """Runs a command and turns every refusal into one sentence and its exit code."""
     watch()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads wait for each other, on all cores
+    keep_freed()
     os.environ.pop("MPLBACKEND", None)  # figures are files here; a backend that is not installed would fail
     try:
         code = commands.main(prog_name="pvid", standalone_mode=False)
