@@ -53,6 +53,15 @@ def test_blur_is_the_relative_error_of_the_drives_second_derivative(taps: int, d
     assert blur_of(PENDULUM, sine(hz, noise=5e-6), design) == pytest.approx(abs(1 - gain), rel=0.05)
 
 
+def test_blur_of_a_signal_that_has_changed_in_place_is_that_of_its_present_samples() -> None:
+    design = WeakDesign(200.0, 1.0, rate_taps=21, rate_degree=3)
+    run = sine(1.0)
+    before = blur_of(PENDULUM, run, design)
+    run["y"][:] = sine(8.0)["y"]
+    assert blur_of(PENDULUM, run, design) == blur_of(PENDULUM, sine(8.0), design) > 10 * before
+    assert blur_of(PENDULUM, run, WeakDesign(200.0, 1.0, rate_taps=31, rate_degree=3)) > blur_of(PENDULUM, run, design)
+
+
 def test_only_measured_drives_blur() -> None:
     assert [(one.of, one.order) for one in rates_of_drives(PENDULUM)] == [("y", 2)]
     assert rates_of_drives(MOTOR) == []

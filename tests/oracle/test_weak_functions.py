@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from pvid.oracle.weak import reversals
 from pvid.oracle.weak.channels import running_integrals
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.functions import TestFunctions
+from pvid.oracle.weak.functions import Float, TestFunctions
 from pvid.oracle.weak.whitener import Whitener
 
 FUNCTIONS = TestFunctions(count=13, power=6, hop=50, dt=0.01)
@@ -126,6 +126,22 @@ def test_a_reversal_with_a_jump_of_acceleration_is_located(t0: float) -> None:
     assert signs.reversals == 1 and not signs.stuck.any()
     assert abs(signs.times[0] - t0) < 1e-3
     assert np.all(signs.values[:190] == 1.0) and np.all(signs.values[210:] == -1.0)
+
+
+def test_a_reversal_is_refined_once_from_each_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    x = kinked(200.41) + np.random.default_rng(0).normal(0, 2e-4, 400)
+    position, once = reversals.Position(x, np.arange(x.size), half=15, sd=2e-4), reversals.refined
+    searched: list[float] = []
+
+    def counted(position: Float, start: Float, half: int, sd: float) -> tuple[Float, Float]:
+        searched.extend(start.tolist())
+        return once(position, start, half, sd)
+
+    monkeypatch.setattr(reversals, "refined", counted)
+    for starts in ([200.0, 201.0], [199.0, 201.0, 200.0], [201.0]):
+        own = np.array(starts)
+        assert np.array_equal(position.refined(own), once(x, own, 15, 2e-4), equal_nan=True)
+    assert sorted(searched) == [199.0, 200.0, 201.0]
 
 
 def test_the_variance_of_a_located_time_is_that_of_its_error() -> None:

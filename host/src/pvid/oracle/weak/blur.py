@@ -36,7 +36,7 @@ def rates_of_drives(model: Compiled) -> list[Jet]:
 def blur_of(model: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> float:
     """Largest rms error of such a derivative over its own rms, on this run; 0 where there is none."""
     return max(
-        (_blur(_longest(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates_of_drives(model)),
+        (_blur(_spectrum(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates_of_drives(model)),
         default=0.0,
     )
 
@@ -45,7 +45,7 @@ def shift_of(fit: Fit, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> 
     """What p is off by, about, because the rates in terms are too small at the frequencies of the motion [n_p]."""
     model = fit.rows.compiled
     rates = model.channels.rates - set(rates_of_drives(model))
-    gains = {jet: _gain(_longest(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates}
+    gains = {jet: _gain(_spectrum(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates}
     if all(abs(gain - 1) < _EXACT for gain in gains.values()):
         return np.zeros(len(fit.p))
     true = record_of(model, run, design, {jet: 2 - gain for jet, gain in gains.items()})
@@ -53,9 +53,42 @@ def shift_of(fit: Fit, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> 
     return scores.shift_by(scores.change_to(true, -1.0)(scores.theta))
 
 
-def _gain(x: Float, design: WeakDesign, order: int) -> float:
+class _Spectrum:
+    """Power of a signal [n] at the frequencies at which it stands above its noise."""
+
+    def __init__(self, x: Float) -> None:
+        self.x, longest = x.copy(), _longest(x)
+        power = np.abs(np.fft.rfft((longest - longest.mean()) * np.hanning(len(longest)))) ** 2
+        power = np.where(power > _ABOVE_NOISE * np.median(power), power, 0.0)
+        self._used, self._size = np.flatnonzero(power), len(longest)
+        self.power = np.asarray(power[self._used], np.float64)
+        self._responses: dict[tuple[float, bytes], tuple[Float, npt.NDArray[np.complex128]]] = {}
+
+    def response(self, design: WeakDesign, order: int) -> tuple[Float, npt.NDArray[np.complex128]]:
+        """These frequencies [rad/s], and what the filter of a derivative makes of them; of each filter once."""
+        weights = weights_of(design, order)
+        key = design.sample_rate, weights.tobytes()
+        if key not in self._responses:
+            omega = 2 * np.pi * np.fft.rfftfreq(self._size, 1 / design.sample_rate)[self._used]
+            places = np.arange(len(weights)) - len(weights) // 2
+            got = np.asarray(np.exp(1j * np.outer(omega / design.sample_rate, places)) @ weights, np.complex128)
+            self._responses[key] = np.asarray(omega, np.float64), got
+        return self._responses[key]
+
+
+_spectra: list[_Spectrum] = []  # of the last signals: designs of one run are many
+_KEPT = 16
+
+
+def _spectrum(x: Float) -> _Spectrum:
+    found = next((one for one in _spectra if np.array_equal(one.x, x)), None) or _Spectrum(x)
+    _spectra[:] = [found, *(one for one in _spectra if one is not found)][:_KEPT]
+    return found
+
+
+def _gain(spectrum: _Spectrum, design: WeakDesign, order: int) -> float:
     """Mean factor of a derivative, over the frequencies that a signal shows above its noise; 1: none is off."""
-    power, omega, got = _response(x, design, order)
+    (omega, got), power = spectrum.response(design, order), spectrum.power
     exact = (1j * omega) ** order
     size = float(power @ np.abs(exact) ** 2)
     return float(power @ np.real(got * np.conj(exact))) / size if size > 0 else 1.0
@@ -66,21 +99,8 @@ def _longest(x: Float) -> Float:
     return max((x[part] for part in segments_of({"": x})), key=len, default=x[:0])
 
 
-def _blur(x: Float, design: WeakDesign, order: int) -> float:
-    power, omega, got = _response(x, design, order)
+def _blur(spectrum: _Spectrum, design: WeakDesign, order: int) -> float:
+    (omega, got), power = spectrum.response(design, order), spectrum.power
     exact = (1j * omega) ** order
     size = float(power @ np.abs(exact) ** 2)
     return float(np.sqrt(power @ np.abs(got - exact) ** 2 / size)) if size > 0 else 0.0
-
-
-def _response(x: Float, design: WeakDesign, order: int) -> tuple[Float, Float, npt.NDArray[np.complex128]]:
-    """Power of a signal at the frequencies at which it stands above its noise [rad/s], and the filter's response."""
-    window = np.hanning(len(x))
-    power = np.abs(np.fft.rfft((x - x.mean()) * window)) ** 2
-    power = np.where(power > _ABOVE_NOISE * np.median(power), power, 0.0)
-    used = np.flatnonzero(power)
-    omega = 2 * np.pi * np.fft.rfftfreq(len(x), 1 / design.sample_rate)[used]
-    weights = weights_of(design, order)
-    places = np.arange(len(weights)) - len(weights) // 2
-    got = np.asarray(np.exp(1j * np.outer(omega / design.sample_rate, places)) @ weights, np.complex128)
-    return np.asarray(power[used], np.float64), np.asarray(omega, np.float64), got

@@ -101,6 +101,7 @@ class Channels:
         self.model = model
         self.last: Record | None = None  # of a run: what another one has in common is taken from it
         self._located: dict[tuple[object, ...], reversals.Signs] = {}
+        self._positions: dict[tuple[object, ...], tuple[reversals.Position, Float]] = {}
         self._of_changed: dict[frozenset[str], tuple[list[int], Any]] = {}
         found: dict[Channel, int] = {}
         plans = []
@@ -303,17 +304,24 @@ class Channels:
         if straight:
             position = sum((float(one) * grid.raw[jet.of] for jet, one in weights.items()), np.zeros(1))
             sd = sum(float(one) ** 2 * self.model.signal(jet.of).sd ** 2 for jet, one in weights.items()) ** 0.5
-            same = hashlib.blake2b(b"".join(np.ascontiguousarray(one).data for one in (v, position, gain)))
+            same = hashlib.blake2b()
+            for one in (v, position, gain):
+                same.update(np.ascontiguousarray(one).data)
             degrees = (design.rate_taps, design.rate_degree, design.degree)
             # Many changes of another signal, and of the design, leave the motion as it is.
-            key = (sd, piece, degrees, design.decimation, int(grid.places[0]), same.digest())
-            if key not in self._located:
+            key = (sd, degrees, design.decimation, int(grid.places[0]), same.digest())
+            if key not in self._positions:
                 half = max(len(gain) // 2, 6)
                 raw = reversals.Position(position, grid.places, half, sd)
-                self._located[key] = reversals.located(v, sd * per_sensor, blur_of(position, grid, v), piece, raw)
+                self._positions[key] = raw, blur_of(position, grid, v)
+                while len(self._positions) > _KEPT:
+                    del self._positions[next(iter(self._positions))]
+            raw, blur = self._positions[key]
+            if (*key, piece) not in self._located:
+                self._located[*key, piece] = reversals.located(v, sd * per_sensor, blur, piece, raw)
                 while len(self._located) > _KEPT:
                     del self._located[next(iter(self._located))]
-            return self._located[key]
+            return self._located[*key, piece]
         variance = 0.0
         for jet, one in weights.items():
             if jet.order == 1:

@@ -86,17 +86,18 @@ def score_of(
     start: Float | None,
     errors: bool,
     fewest: int = 1,
+    digest: bytes = b"",
 ) -> Scored | None:
     """None where the design does not fit the run, or has not the fewest windows that are wanted.
 
     Kept for the last few thousand arguments: both cores, a comparison and a second command ask for the same scores.
+
+    Parameters
+    ----------
+    digest : of the run, where it is known
     """
-    samples = hashlib.blake2b()
-    for name in sorted(run):
-        samples.update(name.encode())
-        samples.update(np.ascontiguousarray(run[name], np.float64).data)
     begun = None if start is None else tuple(np.asarray(start, np.float64).tolist())
-    key = (model.number, samples.digest(), design, begun, errors, fewest)
+    key = (model.number, digest or digest_of(run), design, begun, errors, fewest)
     if key in _scores:  # an answer does not depend on what was kept
         found, units = _scores[key]
         work.spend(units)
@@ -107,6 +108,15 @@ def score_of(
     while len(_scores) > _KEPT:
         del _scores[next(iter(_scores))]
     return found
+
+
+def digest_of(run: Mapping[str, npt.ArrayLike]) -> bytes:
+    """Of the samples of a run and the names of its signals."""
+    samples = hashlib.blake2b()
+    for name in sorted(run):
+        samples.update(name.encode())
+        samples.update(np.ascontiguousarray(run[name], np.float64).data)
+    return samples.digest()
 
 
 def _scored(
@@ -218,6 +228,7 @@ def _ranked(
 ) -> list[Scored]:
     """The same with windows of which the run has at least so many; fewer only where those lead nowhere."""
     plain = {name: x for name, x in run.items()}
+    digest = digest_of(run)
     parts = [part.stop - part.start for part in segments_of(samples_of(model.bare, plain))]
     rates = any(jet.order for jet in model.channels.needed)
     basis = replace(basis_of(model, sample_rate), reversals=reversals)
@@ -230,7 +241,7 @@ def _ranked(
             best = min(tried, key=_order, default=None)
             if best and work.is_spent():
                 return
-            found = score_of(model, run, design, best.p if best else start, errors, fewest - 2)
+            found = score_of(model, run, design, best.p if best else start, errors, fewest - 2, digest)
             if found is not None:
                 tried.append(found)
 

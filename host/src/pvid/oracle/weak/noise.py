@@ -60,7 +60,7 @@ class NoiseFilters:
 
     def gains(self, record: Record) -> list[dict[str, list[Gain]]]:
         """Of each row kind: sensor -> gains. (Nuisances are left out: their noise is second order.)"""
-        size, design = record.grid.size, record.grid.design
+        size, design, parts = record.grid.size, record.grid.design, record.grid.parts
         slopes = [
             broadcast(one, size) for one in self._function(*record.arguments, *(one.slopes for one in record.signs))
         ]
@@ -69,9 +69,8 @@ class NoiseFilters:
         for (_, _, depth), slope in zip(self.entries, slopes, strict=True):
             chain = [slope]
             for _ in range(depth):
-                chain.append(
-                    np.concatenate([slope_of(chain[-1][part], smooth, design.dt) for part in record.grid.parts])
-                )
+                slopes_of_parts = [slope_of(chain[-1][part], smooth, design.dt) for part in parts]
+                chain.append(slopes_of_parts[0] if len(parts) == 1 else np.concatenate(slopes_of_parts))
             chains.append(chain)
         out = []
         for row in self.channels.rows:
@@ -86,7 +85,8 @@ class NoiseFilters:
                     for i, g in enumerate(chain):
                         factor = (-1.0) ** (term.order + depth) * float(sp.binomial(depth, i)) * term.factor
                         key = (sensor, term.column, term.order + depth - i)
-                        found[key] = found.get(key, np.zeros(size)) + factor * g
+                        share = factor * g
+                        found[key] = found[key] + share if key in found else share
             of_row: dict[str, list[Gain]] = {}
             for (sensor, column, order), values in found.items():
                 if values.any():
@@ -97,7 +97,7 @@ class NoiseFilters:
 
 def slope_of(g: Float, reach: int, dt: float) -> Float:
     """Derivative over +-reach steps; at the ends over what there is."""
-    if not np.any(g != g[0]):
+    if g.strides == (0,) or not np.any(g != g[0]):
         return np.zeros(g.shape)
     k = np.arange(len(g))
     high, low = np.minimum(k + reach, len(g) - 1), np.maximum(k - reach, 0)
@@ -118,7 +118,8 @@ class NoiseModel:
         for sensor in sorted(set().union(*of_kinds)):
             own = [(kind, gain) for kind, row in enumerate(of_kinds) for gain in row.get(sensor, [])]
             stack = np.array([gain.values for _, gain in own])
-            stack = stack[:, np.isfinite(stack).all(axis=0)]
+            there = np.isfinite(stack).all(axis=0)
+            stack = stack if there.all() else stack[:, there]
             variance = density(filters.channels.model.signal(sensor), record.grid.design)
             self._sensors.append(
                 _SensorGains(

@@ -8,7 +8,7 @@ around it get the values with which the sum equals the integral of sgn(v) g(t) f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -159,12 +159,23 @@ class Position:
     places : sample of each step
     half : samples before and after a reversal that its parabola takes
     sd : of a sample's noise
+    known : time of a reversal and its variance, by where the search for it began [samples]
     """
 
     samples: Float
     places: npt.NDArray[np.int64]
     half: int
     sd: float
+    known: dict[float, tuple[float, float]] = field(default_factory=dict)
+
+    def refined(self, start: Float) -> tuple[Float, Float]:
+        """See `refined`; of each start once."""
+        new = [one for one in dict.fromkeys(start.tolist()) if one not in self.known]
+        if new:
+            times, variances = refined(self.samples, np.array(new), self.half, self.sd)
+            self.known.update(zip(new, zip(times.tolist(), variances.tolist(), strict=True), strict=True))
+        found = np.array([self.known.get(one, (one, np.nan)) for one in start.tolist()]).reshape(-1, 2)
+        return found[:, 0], found[:, 1]
 
 
 def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position | None = None) -> Signs:
@@ -220,7 +231,7 @@ def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position |
         if position is not None:
             stride = float(position.places[1] - position.places[0])
             start = position.places[0] + t[turns] * stride
-            raw, spread = refined(position.samples, start, position.half, position.sd)
+            raw, spread = position.refined(start)
             better = np.isfinite(spread) & (np.abs(raw - start) < (span[turns] + 2) * stride)
             t[turns] = np.where(better, (raw - position.places[0]) / stride, t[turns])
             variances[turns] = np.where(better, spread / stride**2, variances[turns] + span[turns] ** 2 / 12)

@@ -283,9 +283,9 @@ class WeakRows:
         whitener = self.whitener(kinds, theta, errors)
         k, plans = self.functions.count, [self.compiled.channels.rows[kind] for kind in kinds]
         parts = self._whitened(kinds, whitener)
-        regressors = np.concatenate([x[:, : row.thetas] for x, row in zip(parts, plans, strict=True)], axis=1)
-        known = sum((x[:, row.thetas] for x, row in zip(parts, plans, strict=True)), np.zeros(regressors[:, 0].shape))
-        nuisances = np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
+        regressors = _joined([x[:, : row.thetas] for x, row in zip(parts, plans, strict=True)])
+        known = np.asarray(sum(x[:, row.thetas] for x, row in zip(parts, plans, strict=True)))
+        nuisances = _joined([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)])
         gone = 0
         if nuisances.shape[1]:
             q, r = np.linalg.qr(nuisances.transpose(0, 2, 1))
@@ -299,7 +299,7 @@ class WeakRows:
     def white_nuisances(self, kinds: Sequence[int], whitener: Whitener) -> Float:
         """Nuisance columns of a group [windows, nuisances, R]."""
         firsts = [self.compiled.channels.rows[kind].thetas + 1 for kind in kinds]
-        return np.concatenate(self._whitened(kinds, whitener, firsts), axis=1)
+        return _joined(self._whitened(kinds, whitener, firsts))
 
     def _whitened(self, kinds: Sequence[int], whitener: Whitener, firsts: Sequence[int] = ()) -> list[Float]:
         """Columns of each kind, from the first that is wanted on [windows, columns, R]: they fill the kind's own
@@ -308,3 +308,8 @@ class WeakRows:
         if firsts:
             chosen = [one[:, first:] for one, first in zip(chosen, firsts, strict=True)]
         return [whitener.of(one, slice(place * k, (place + 1) * k)) for place, one in enumerate(chosen)]
+
+
+def _joined(columns: Sequence[Float]) -> Float:
+    """Columns [windows, columns, R] of several kinds beside each other."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns, axis=1)
