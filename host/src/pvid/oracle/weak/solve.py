@@ -353,7 +353,7 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError
             continue
         q, u = np.linalg.eigh(white)
         q = np.maximum(q, 0.0)
-        z = np.einsum("ij,ik,kj->j", u, moment, u)
+        z = np.asarray(np.sum(u * (moment @ u), axis=0))
         v, rise = most_likely(q, z)
         if rise * len(e) * share < _HINT:
             continue
