@@ -25,41 +25,28 @@ settings.load_profile("seeded")
 # Files that `./tools/test quick` leaves out: images, emulators, builds, tools, many identifications. tools/test gives
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
-SLOW = (
-    *("tools/pages", "board/targets", "tools/wheel", "identification/refined"),
-    *("cli/design_cost", "cli/identify_in_c", "log/log", "deploy/deploy", "cli/cli"),
-    *("identification/work", "identification/refined_answer", "identification/refined_search"),
-    *("identification/mechanism_advice", "oracle/samples", "identification/refined_kinds", "identification/judge"),
-    *("identification/additions", "log/text_table", "oracle/feedback", "identification/following"),
-    *("cli/foreign_files", "cli/several", "codegen/strong_model_q31"),
-    *("board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
-    *("bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
-    *("board/ports", "tools/notebooks", "cli/run_input", "identification/wild_samples", "identification/scale_errors"),
-    *("cli/identify_run", "tools/consumer", "twin/weak_q31"),
-    *("board/refined_stream", "fleet/batch", "twin/weak_f32", "twin/refinement"),
-    *("cli/api", "codegen/build", "bench/year", "show/view"),
-    *("twin/second_stage", "deploy/deploy_avr", "bench/strong_mechanisms"),
-    *(
-        "bench/accidents",
-        "identification/own_mechanisms",
-        "bench/hard",
-        "twin/kinds_q31",
-    ),
-    *("log/witness", "twin/state", "bench/verifying"),
-    *("core/sizes_agree", "board/mechanism_board", "codegen/generated_q31"),
-    *("core/trust_q31",),
-    *("board/port", "codegen/generated_f32", "cli/readme", "core/read_while_stepping", "log/export"),
-    *("codegen/strong_model", "log/untrusted", "board/field", "core/weak_rows_q31", "oracle/missing"),
-    *("core/bad_config", "model/elimination", "oracle/weak_identify", "link/link"),
-    *("core/dead_zone", "oracle/weak_choice", "codegen/weak_c"),
-    *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/demo_run", "bench/model_boards"),
-    *("core/dropped_calls", "bench/build_choices", "board/generated", "tools/core_rooms", "board/strong_image"),
-    *("codegen/model_q31", "core/recorded_hashes", "twin/estimator_q31", "bench/mechanisms"),
-    *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
-    *("twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
-    *("tools/analysis", "board/weak_boards", "oracle/strong_described", "codegen/random"),
-    *("paper/paper", "tools/mutate", "oracle/weak_in_c", "show/answer_figure"),
-)
+SLOW = """
+    cli/identify_in_c cli/cli bench/random_models oracle/missing twin/weak_q31 identification/work cli/identify_run
+    board/memory cli/design_cost log/log paper/paper identification/refined_search cli/run_input
+    identification/refined_answer bench/refine_mechanisms show/answer_figure board/stream bench/attack board/ports
+    identification/additions deploy/deploy twin/weak_f32 identification/mechanism_advice cli/api show/page
+    codegen/build bench/liar oracle/samples cli/demo_run identification/refined_kinds codegen/strong_model
+    identification/judge tools/pages core/trust_q31 identification/scale_errors board/targets
+    identification/own_mechanisms show/view core/core_q31 identification/refined twin/second_stage
+    board/refined_board tools/wheel board/strong_image cli/several board/mechanism_board board/field
+    core/read_while_stepping cli/foreign_files identification/several_recordings identification/following fleet/batch
+    board/refined_stream codegen/generated_q31 bench/mechanisms cli/readme log/verify log/witness oracle/weak_in_c
+    board/weak_boards core/weak_rows_q31 core/arithmetic_options codegen/weak_c core/recorded_hashes
+    codegen/model_q31 oracle/feedback codegen/generated_f32 oracle/weak_identify bench/accidents core/sizes_agree
+    twin/state bench/year tools/notebooks oracle/corners model/elimination twin/kinds_q31 tools/core_rooms
+    oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link twin/runs_begin oracle/scale
+    identification/refined_length board/generated twin/refinement codegen/refine core/dropped_calls sim/rigs
+    core/bad_config bench/longevity core/model_library core/equation_error tools/docs identification/wild_samples
+    board/port bench/strong_mechanisms cli/output tools/proofs log/untrusted show/pictures tools/loops
+    oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random bench/hard bench/verifying
+    log/export log/text_table core/dead_zone tools/mutate bench/model_boards deploy/deploy_avr identification/skew
+    bench/build_choices
+""".split()
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")
 
