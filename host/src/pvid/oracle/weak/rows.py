@@ -257,13 +257,11 @@ class WeakRows:
     def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
         """Of located reversals, one standard deviation long [windows, entries, R]."""
         places = self.places
-        return (
-            np.where(
-                (places >= 0)[:, :, np.newaxis], self.reversals.directions(kinds, theta)[np.maximum(places, 0)], 0.0
-            )
-            if places.size
-            else np.zeros((*places.shape, len(kinds) * self.functions.count))
-        )
+        if not places.size:
+            return np.zeros((*places.shape, len(kinds) * self.functions.count))
+        out = self.reversals.directions(kinds, theta)[np.maximum(places, 0)]
+        out[places < 0] = 0.0
+        return out
 
     def whitener(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Whitener:
         """Of the covariance of every window; rows of a model without noise are scaled to their size."""
