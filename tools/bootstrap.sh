@@ -264,10 +264,11 @@ requirements_are_installed() { # requirements_are_installed PROFILE
 # by_uv FILE OPTION...: installs the packages of a file, from the registry that pip is told of. Its own wheel is one of
 # the lock file; where a processor has none, or uv fails, pip does it: with a tenth of the speed.
 by_uv() {
-    local file=$1 uv=$venv/bin/uv
+    local file=$1 uv=$venv/bin/uv index
     shift
     [[ -x $uv ]] || return 1
-    [[ -z ${PIP_INDEX_URL-} ]] || export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$PIP_INDEX_URL}
+    index=${PIP_INDEX_URL-$("$python" -m pip config get global.index-url 2>/dev/null || true)}
+    [[ -z $index ]] || export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$index}
     [[ -z ${PIP_FIND_LINKS-} ]] || export UV_FIND_LINKS=${UV_FIND_LINKS:-$PIP_FIND_LINKS}
     [[ -z ${PIP_CERT-} ]] || export SSL_CERT_FILE=${SSL_CERT_FILE:-$PIP_CERT}
     "$uv" pip install --python "$python" --require-hashes "$@" --requirement "$file" >"$build/log/uv.log" 2>&1 </dev/null

@@ -244,6 +244,49 @@ def test_no_exit_leaves_an_installation_alone(installing: Installing, tmp_path: 
         assert all((tmp_path / name).exists() for name in ("gcc", "qemu", "core"))
 
 
+# The environment's Python: it tells what pip is asked for, and "installs" uv where there is one for this processor.
+PYTHON = """#!/bin/sh
+for last; do :; done
+case "$*" in
+*sysconfig*) echo site ;;
+*config*) echo https://mirror.example/simple ;;
+*installer.txt) [ ! -e ready-uv ] || cp ready-uv build/venv/bin/uv ;;
+*) echo "pip ${last##*/}" >>told ;;
+esac
+"""
+UV = """#!/bin/sh
+for last; do :; done
+echo "uv ${last##*/} from $UV_DEFAULT_INDEX" >>told
+"""
+BY_UV = [f"uv {name} from https://mirror.example/simple" for name in ("builders.txt", "wanted.txt")]
+BY_PIP = ["pip builders.txt", "pip wanted.txt"]
+
+
+@pytest.mark.parametrize(
+    ("uv", "installed"),
+    [(UV, BY_UV), (UV + "exit 1\n", [BY_UV[0], BY_PIP[0], BY_UV[1], BY_PIP[1]]), ("", BY_PIP)],
+    ids=["uv", "uv fails", "no uv"],
+)
+def test_uv_installs_from_the_index_of_pip_and_pip_where_it_cannot(
+    uv: str, installed: list[str], tmp_path: Path
+) -> None:
+    for name in ("tools/bootstrap.sh", "tools/requirements.txt", "host/pyproject.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    for folder in ("site", "build/venv/bin", "build/log"):
+        (tmp_path / folder).mkdir(parents=True)
+    for place, text in (("build/venv/bin/python", PYTHON), ("ready-uv", uv)):
+        if text:
+            (tmp_path / place).write_text(text, encoding="utf-8")
+            (tmp_path / place).chmod(0o755)
+    plain = {name: value for name, value in os.environ.items() if not name.startswith(("PIP_", "UV_"))}
+    script = ". tools/bootstrap.sh; set -euo pipefail; install_requirements test"
+    done = subprocess.run(["bash", "-c", script], cwd=tmp_path, env=plain, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "told").read_text(encoding="utf-8").splitlines() == installed
+    assert (tmp_path / "build" / "venv" / "installed-test").exists()
+
+
 def test_every_package_that_is_installed_has_its_version_and_hashes() -> None:
     project = tomllib.loads((ROOT / "host" / "pyproject.toml").read_text(encoding="utf-8"))
     blocks = re.findall(r"(?m)^[^\s#].*(?:\n .*)*\n", LOCK)
