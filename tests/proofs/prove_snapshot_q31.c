@@ -39,5 +39,6 @@ void main(void)
     /*@ assert identifier.design == &weak_design && identifier.accumulator.design == &weak_design; */
     /*@ assert identifier.accumulator.front.offset == &limits[0] && identifier.drive_min == &limits[0]; */
     /*@ assert identifier.estimator.model == &model; */
-    (void)pvid_snapshot_save_weak_q31(&identifier, &weak_config, any_u32(0, UINT32_MAX), image, any_u32(0, sizeof image));
+    (void)pvid_snapshot_save_weak_q31(&identifier, &weak_config, any_u32(0, UINT32_MAX), image,
+                                      any_u32(0, sizeof image));
 }

@@ -15,7 +15,6 @@ from pvid.base.toml_text import toml_document
 from pvid.base.wording import printable
 from pvid.board.float_board import FloatBoard, recording_header
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
-from pvid.board.settings_text import TABLE, array_of, part_of, written
 from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.generated import GeneratedModel
@@ -51,6 +50,7 @@ from pvid.settings.cores import CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.refine import RefineConfig, RefineSignal
+from pvid.settings.text import TABLE, array_of, part_of, written
 from pvid.settings.weak import Source as SignalSource
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise
 from pvid.sim.simulated_run import RigSimulation

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.settings_text import TABLE
 from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
@@ -40,6 +39,7 @@ from pvid.oracle.weak.edges import with_edges
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
+from pvid.settings.text import TABLE
 from pvid.settings.weak_q31 import Rescale, WeakConfigQ31, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakNoiseQ31
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.printed import PrintedTwin

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.board.float_board import FloatBoard, recording_header
-from pvid.board.settings_text import TABLE, array_of, part_of, written
 from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_strong, files_strong_design
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
@@ -29,6 +28,7 @@ from pvid.rig.run import Recording
 from pvid.settings.enums import Law
 from pvid.settings.parts import EstimatorConfig, GateConfig
 from pvid.settings.strong import StrongModelConfig
+from pvid.settings.text import TABLE, array_of, part_of, written
 from pvid.sim.simulated_run import RigSimulation
 
 _COMMAND = "pvid log"

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
-from pvid.board.settings_text import TABLE
 from pvid.link.frames import Hello, Names
 from pvid.link.names import BoardNames
 from pvid.log.mechanism import UNNAMED, LogMechanism, mechanism_described, mechanism_named
@@ -26,6 +25,7 @@ from pvid.rig.columns import Columns
 from pvid.rig.former import mechanism_of_former
 from pvid.rig.mechanism_file import parsed_file
 from pvid.rig.run import MIN_ROWS, Recording
+from pvid.settings.text import TABLE
 
 LOG_SUFFIX = ".pvlog"
 _LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
