@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,17 +15,16 @@ from pvid.model.compiled import CompiledModel
 from pvid.model.corners import feedthroughs
 from pvid.model.normalise import with_own_scales
 from pvid.model.together import offsets, with_own
+from pvid.oracle.weak import work
 from pvid.oracle.weak.edges import with_edges
 from pvid.oracle.weak.failures import attempted
-from pvid.oracle.weak.identify import Identified
+from pvid.oracle.weak.identify import Identified, allowance_of
 from pvid.oracle.weak.identify import identify as identified_by
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.run import Recording
 
-if TYPE_CHECKING:
-    pass
-
 _NOTHING = 1e-6  # of its guess: a positive parameter that has shrunk
+_OF_SECOND = 1.5  # of the allowance of a search: scales of its own bring an answer in 1.0; where nothing fits, in none
 
 
 @np.errstate(all="ignore")  # what diverges is judged, and told in words
@@ -52,7 +50,8 @@ def analysed(
     found = identified_by(whole, recording.run, recording.sample_rate, weights=weights)
     if _collapsed(model, found) and (scaled := with_own_scales(model)) is not None:
         other = with_own(scaled, own, names)
-        again = attempted(lambda: identified_by(other, recording.run, recording.sample_rate, weights=weights))
+        with work.limited(_OF_SECOND * allowance_of(other, recording.run, recording.sample_rate)):
+            again = attempted(lambda: identified_by(other, recording.run, recording.sample_rate, weights=weights))
         if again is not None and _determined(again) > _determined(found):
             whole, found = other, again
     model = whole
