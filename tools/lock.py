@@ -32,18 +32,8 @@ HEADER = "# Written by tools/lock.py from host/pyproject.toml: do not edit.\n"
 
 def compiled(extras: list[str], *options: str) -> str:
     """What uv resolves for pvid with these extras and the backend that installs it."""
-    command = [
-        sys.executable,
-        "-m",
-        "uv",
-        "pip",
-        "compile",
-        "--quiet",
-        "--universal",
-        "--python-version",
-        "3.11",
-        "--no-header",
-    ]
+    command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--universal", "--no-header"]
+    command += ["--python-version", "3.11"]
     command += ["--no-annotate", "--no-emit-index-url", "--no-emit-find-links"]
     command += ["--fork-strategy", "fewest", *options]
     command += [f"--extra={extra}" for extra in extras]

@@ -1,4 +1,4 @@
-"""What a rig file says of forgetting and of the gate reaches the weak identifier, in both cores, and the refinement."""
+"""Both cores of the weak identifier, and the refinement, have the forgetting and the gate of the rig file."""
 
 from __future__ import annotations
 

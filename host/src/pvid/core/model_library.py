@@ -73,13 +73,17 @@ def model_library(
     compiler = host_compiler(_WHAT)
     definitions = options_of(sizes)
     key = hashlib.sha256("\0".join([build_of(compiler), *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
-    folder = cache_folder() / "models" / f"{name}-{build.name}-{key.hexdigest()[:20]}"
+    folder = _kept() / f"{name}-{build.name}-{key.hexdigest()[:20]}"
     library = folder / f"lib{name}.so"
     if not library.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
         declared = headers or sorted(one for one in texts if one.endswith(".h"))
         _build(compiler, texts, definitions, library, build, declared)
     return library
+
+
+def _kept() -> Path:
+    return cache_folder() / "models"
 
 
 def _flat(texts: Mapping[str, str]) -> Iterable[str]:
@@ -142,7 +146,7 @@ def _build(
             (folder / name).write_text(text, encoding="utf-8")
         options = [f"-I{folder.name}", *core_options(definitions), f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        core = _core_objects(compiler, definitions, build, library.parent.parent)
+        core = _core_objects(compiler, definitions, build)
         if _REFINED in texts:
             core = [one for one in core if not of_second_stage(Path(one))]
             code += [one for one in core_of(build, True) if of_second_stage(one)]
@@ -157,15 +161,15 @@ def _build(
                 raise
 
 
-def _core_objects(compiler: str, definitions: list[str], build: CoreBuild, cache_folder: Path) -> list[str]:
+def _core_objects(compiler: str, definitions: list[str], build: CoreBuild) -> list[str]:
     """Of the core without the second stage: those of one size are the same for every mechanism."""
     sources = core_of(build, False)
     named = [str(one) for one in sources]
     key = hashlib.sha256("\0".join([build_of(compiler), *_FLAGS, *definitions, *named, _core_hash()]).encode())
-    place = cache_folder / f"core-{build.name}-{key.hexdigest()[:20]}"
+    place = _kept() / f"core-{build.name}-{key.hexdigest()[:20]}"
     with FileLock(place.with_name(f".{place.name}.lock")):
         if not place.exists():
-            with tempfile.TemporaryDirectory(dir=cache_folder) as made:
+            with tempfile.TemporaryDirectory(dir=_kept()) as made:
                 folder = Path(made) / "objects"
                 folder.mkdir()
                 objects_of(compiler, core_options(definitions), sources, folder)

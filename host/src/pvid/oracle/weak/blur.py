@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.recent import Recent
 from pvid.model.signals import Jet
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.front import segments_of, weights_of
@@ -36,7 +37,7 @@ def rates_of_drives(model: Compiled) -> list[Jet]:
 def blur_of(model: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> float:
     """Largest rms error of such a derivative over its own rms, on this run; 0 where there is none."""
     return max(
-        (_blur(_spectrum(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates_of_drives(model)),
+        (_blur(_spectrum(np.array(run[jet.of], np.float64)), design, jet.order) for jet in rates_of_drives(model)),
         default=0.0,
     )
 
@@ -45,7 +46,7 @@ def shift_of(fit: Fit, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> 
     """What p is off by, about, because the rates in terms are too small at the frequencies of the motion [n_p]."""
     model = fit.rows.compiled
     rates = model.channels.rates - set(rates_of_drives(model))
-    gains = {jet: _gain(_spectrum(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates}
+    gains = {jet: _gain(_spectrum(np.array(run[jet.of], np.float64)), design, jet.order) for jet in rates}
     if all(abs(gain - 1) < _EXACT for gain in gains.values()):
         return np.zeros(len(fit.p))
     true = record_of(model, run, design, {jet: 2 - gain for jet, gain in gains.items()})
@@ -57,7 +58,7 @@ class _Spectrum:
     """Power of a signal [n] at the frequencies at which it stands above its noise."""
 
     def __init__(self, x: Float) -> None:
-        self.x, longest = x.copy(), _longest(x)
+        longest = _longest(x)
         power = np.abs(np.fft.rfft((longest - longest.mean()) * np.hanning(len(longest)))) ** 2
         power = np.where(power > _ABOVE_NOISE * np.median(power), power, 0.0)
         self._used, self._size = np.flatnonzero(power), len(longest)
@@ -76,14 +77,7 @@ class _Spectrum:
         return self._responses[key]
 
 
-_spectra: list[_Spectrum] = []  # of the last signals: designs of one run are many
-_KEPT = 16
-
-
-def _spectrum(x: Float) -> _Spectrum:
-    found = next((one for one in _spectra if np.array_equal(one.x, x)), None) or _Spectrum(x)
-    _spectra[:] = [found, *(one for one in _spectra if one is not found)][:_KEPT]
-    return found
+_spectrum = Recent(_Spectrum, equal=np.array_equal)  # designs of one run are many
 
 
 def _gain(spectrum: _Spectrum, design: WeakDesign, order: int) -> float:

@@ -143,10 +143,10 @@ def _in_common(like: Grid, raw: Mapping[str, Float], design: WeakDesign, orders:
 
 def segments_of(samples: Mapping[str, Float]) -> list[slice]:
     """Stretches of a run in which no signal misses a sample."""
-    if all(np.isfinite(one).all() for one in samples.values()):
-        size = len(next(iter(samples.values())))
-        return [slice(0, size)] if size else []
-    there = np.logical_and.reduce([np.isfinite(one) for one in samples.values()])
+    finite = [np.isfinite(one) for one in samples.values()]
+    if all(one.all() for one in finite):
+        return [slice(0, len(finite[0]))] if len(finite[0]) else []
+    there = np.logical_and.reduce(finite)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
     return [slice(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
