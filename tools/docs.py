@@ -55,7 +55,7 @@ def documented(thing: object) -> str:
             out += [f"*{line}*", ""]
         elif section == "Examples" and line:
             out.append(f"    {line.removesuffix('  # doctest: +SKIP')}")
-        elif section and line and not line.startswith(" "):
+        elif section not in ("", "Returns") and line and not line.startswith(" "):
             name, colon, rest = line.partition(" : ")
             out.append(f"- `{name}`{': ' if colon else ''}{rest}")
         else:
@@ -64,9 +64,11 @@ def documented(thing: object) -> str:
 
 
 def signature_of(name: str, thing: Callable[..., object]) -> str:
-    """A call with its arguments, one a line if there are many; without the annotations' quotes."""
+    """A call with its arguments, one a line if there are many."""
     parameters = [
-        str(one).replace("'", "") for one in inspect.signature(thing).parameters.values() if one.name != "self"
+        str(one).replace(repr(one.annotation), str(one.annotation), 1)
+        for one in inspect.signature(thing).parameters.values()
+        if one.name != "self"
     ]
     inner = ", ".join(parameters)
     return f"{name}({inner})" if len(inner) < 80 else f"{name}(\n    " + ",\n    ".join(parameters) + ",\n)"
