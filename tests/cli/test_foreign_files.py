@@ -66,7 +66,7 @@ NAMED = {  # with the rig file in the place of its own option
     "model build": ["model", "build", "dc_motor", "--rig", "FILE", "-o", "built"],
     "deploy": ["deploy", "dc_motor", "--rig", "FILE", "-o", "deployed", "--for", "arduino"],
 }
-READ_NO_FILES = {"demo", "simulate", "ports", "sizes", "schema", "tables", "models", "bench"}
+READ_NO_FILES = {"demo", "look", "simulate", "ports", "sizes", "schema", "tables", "models", "bench"}
 
 
 def run(arguments: list[str]) -> Result:

@@ -26,6 +26,7 @@ from pvid.base.wording import reason
 GROUPS: Mapping[str, Mapping[str, str]] = {
     "Identify": {
         "demo": "Identify a simulated rig in the firmware on an emulated board.",
+        "look": "Say what is in a recording, which mechanism it can be, and what to type next.",
         "simulate": "Simulate a rig and write its run and rig file.",
         "identify": "Identify the parameters from a recorded or simulated run.",
         "validate": "Say how well an answer predicts another run.",

@@ -32,7 +32,7 @@ _CODES, _FEWEST_CODES, _STEADY = 8, 4, 0.05
 _MOST_FAR = 0.05  # of the samples: with more, the recording is refused
 
 
-def _far_from_median(x: Float, sd: float) -> Mask:
+def far_from_median(x: Float, sd: float) -> Mask:
     """Samples that are far from the median about them, alone or in runs of a few."""
     half = _MEDIAN_OF // 2
     about = np.lib.stride_tricks.sliding_window_view(np.pad(x, half, mode="edge"), _MEDIAN_OF)
@@ -135,7 +135,7 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     for one in model.signals:
         if one.kind != "sensor" or one.driven or not orders[one.name]:
             continue
-        find = partial(_far_from_median, sd=one.sd)
+        find = partial(far_from_median, sd=one.sd)
         if orders[one.name] < 2:
             find = partial(_error_codes, sd=one.sd, steady=steady)
         x, note = _without_far_samples(recording, one, find)

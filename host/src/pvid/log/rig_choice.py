@@ -137,9 +137,10 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
         return found[0]
     what = "the data" if run_path is None else str(run_path)
     if not found:
+        look = "" if run_path is None else "; pvid look shows what the file has"
         signals = [f"{name} ({', '.join(one.name for one in description_of(name).signals)})" for name in names()]
         raise PvidError(
             f"{what}: no shipped mechanism has these columns: name yours with --model, and its columns with --columns; "
-            f"they are {listed(signals, 'or')}"
+            f"they are {listed(signals, 'or')}{look}"
         )
     raise PvidError(f"{what} can be of {listed(found, 'or')}: name the mechanism with --model")

@@ -43,7 +43,7 @@ class Channel:
         return re.search(usual, name, re.I) is not None
 
 
-_TIME = Channel("t", "s", usual=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
+TIME = Channel("t", "s", usual=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
 
 # What people call a signal of a unit, besides its own name.
 _USUAL_NAMES = {
@@ -108,7 +108,7 @@ class Columns:
     @property
     def units(self) -> dict[str, str]:
         """In SI, by signal: that of the time first."""
-        return {one.name: one.unit for one in (_TIME, *self.channels)}
+        return {one.name: one.unit for one in (TIME, *self.channels)}
 
     @property
     def held(self) -> frozenset[str]:
@@ -208,16 +208,23 @@ class Columns:
             found = ", ".join(shown(name, 24) for name in names[:8]) + (", ..." if len(names) > 8 else "")
             raise MissingColumnError(
                 f"{path}{where}: no column {wanted} among {found or 'none'}: "
-                f"use --columns {self._suggestion(names, places)}."
+                f"use --columns {self.suggestion(names, places)}.",
+                tuple(names),
             )
         return places
 
-    def _suggestion(self, names: Sequence[str], places: Mapping[str, int]) -> str:
-        """The text for --columns that is likely to be meant; a signal whose column cannot be guessed is NAME."""
+    def suggestion(self, names: Sequence[str], places: Mapping[str, int]) -> str:
+        """The text for --columns that is likely to be meant; a signal whose column cannot be guessed is NAME.
+
+        Parameters
+        ----------
+        names : of the columns of a file
+        places : of the signals that have been found among them
+        """
         taken = set(places.values())
         parts = []
         numbered = list(names) == [str(k + 1) for k in range(len(names))]  # the file has no names
-        for order, channel in enumerate((_TIME, *self.channels)):
+        for order, channel in enumerate((TIME, *self.channels)):
             signal, unit = channel.name, channel.unit
             place: int | None = places.get(signal)
             if place is None and numbered and order < len(names):
@@ -234,13 +241,17 @@ class Columns:
             name = names[place]
             plain = name.isprintable() and len(name) <= 24 and not set(name) & set("='\"")
             typed = (f'"{name}"' if set(name) & set(",:") else name) if plain else place + 1
-            parts.append(f"{signal}={typed}:{_unit_in(name, unit) or unit or 1}")
+            parts.append(f"{signal}={typed}:{unit_in(name, unit) or unit or 1}")
         text = ",".join(parts)
         return text if re.fullmatch(r"[\w=:,.\-]+", text, re.ASCII) else f"'{text}'"
 
 
 class MissingColumnError(PvidError):
-    """A file has no column for a signal."""
+    """A file has no column for a signal; `names` are those of its columns."""
+
+    def __init__(self, sentence: str, names: tuple[str, ...]) -> None:
+        super().__init__(sentence)
+        self.names = names
 
 
 def parsed(text: str | None, channels: tuple[Channel, ...]) -> Columns:
@@ -282,7 +293,7 @@ def _scale(si: str, text: str) -> Scale | None:
     return Scale(number) if math.isfinite(number) and number > 0.0 else None
 
 
-def _unit_in(name: str, si: str) -> str | None:
+def unit_in(name: str, si: str) -> str | None:
     """The unit at the end of a column's name: `angle_deg`, `h (mm)`, `time[ms]`."""
     match = _UNIT_AT_END.search(name)
     if match is None:

@@ -49,7 +49,7 @@ Function = TypeVar("Function")
 # The shortest finite difference of order 4 takes 5 samples: fewer feed no form of the identifier.
 MIN_ROWS = 5
 
-_LONG_BLANK_ROWS = 20  # in a column of an input's changes
+LONG_BLANK_ROWS = 20  # in a column of an input's changes
 
 _LARGEST = 1e12  # [rad] or [m]: counts of 40 bits
 
@@ -169,7 +169,11 @@ def read_recording(path: str | os.PathLike[str], rate: float | None, columns: Co
     """
     if rate is not None and not 0 < rate < float("inf"):
         raise PvidError(f"The sample rate must be a positive number of Hz, not {rate:g}.")
-    path = Path(path)
+    return recording_of_table(read_table(Path(path), columns), rate)
+
+
+def read_table(path: Path, columns: Columns) -> Table:
+    """The wanted columns of a file, before their clock is looked at; see `read_recording`."""
     try:
         if path.is_dir():
             raise PvidError(f"{path} is a directory, not a recorded run.")
@@ -177,11 +181,15 @@ def read_recording(path: str | os.PathLike[str], rate: float | None, columns: Co
             raise PvidError(f"{path} does not exist.")
         if not path.is_file():
             raise PvidError(f"{path} is not a regular file.")
-        table = _read_as(path)(path, columns)
+        return _read_as(path)(path, columns)
     except (OSError, ValueError) as error:
         raise PvidError(f"{path} cannot be read: {reason(error)}.") from error
     except MemoryError as error:
         raise PvidError(f"{path} does not fit into memory.") from error
+
+
+def recording_of_table(table: Table, rate: float | None) -> Recording:
+    """The signals of a table on one uniform clock, with the checks and corrections of `read_recording`."""
     return _recording(_checked(table), rate)
 
 
@@ -277,7 +285,7 @@ def _with_kept_values(table: Table) -> Table:
     for name in table.columns.held.intersection(table.signals):
         values = table.signals[name]
         blank = int(np.count_nonzero(np.isnan(values)))
-        if blank and holds_changes(values, _LONG_BLANK_ROWS):
+        if blank and holds_changes(values, LONG_BLANK_ROWS):
             kept[name] = last_values(values)
             notes.append(f"{table.columns[name].name} is blank where it does not change: {blank} cells keep its value")
     if not kept:

@@ -1,0 +1,150 @@
+"""`pvid look`: what is in a file, and a next command that works."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from pvid.base.console import DONE
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.identification.survey import lines_of_a_model, proposals, surveyed, unit_of_name
+from pvid.models.simulated_rig import simulated_rig
+
+
+def pvid(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
+
+
+def written(path: Path, head: str, columns: list[list[str]]) -> Path:
+    rows = [",".join(row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+N = 3000
+T = np.arange(N) / 500
+SLOW = 0.1 * np.sin(2 * np.pi * 1.3 * T)
+
+
+def numbers(values: np.ndarray, digits: int = 5) -> list[str]:
+    return [f"{one:.{digits}f}" for one in values]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """Of an instrument: a title, a row of units, and a column of every kind."""
+    random = np.random.default_rng(1)
+    force = np.repeat(random.uniform(-5, 5, N // 100), 100)
+    counts = np.round(20000 * T + 2000 * np.sin(3 * T)) % 65536
+    wild = np.where(np.arange(N) % 300 == 7, -1.0, SLOW)
+    half = [one if k % 2 == 0 else "" for k, one in enumerate(numbers(SLOW))]
+    clipped = np.clip(SLOW + 1e-4 * random.standard_normal(N), -1.0, 0.08)
+    head = ("scope 7\ntime,force,angle,counts,wild,half,clipped,name,level,row\nms,N,deg,,mm,m,V,,A,\n").rstrip("\n")
+    columns = [numbers(1000 * T, 1), numbers(force, 3), numbers(573 * SLOW, 2), numbers(counts, 0), numbers(wild)]
+    columns += [half, numbers(clipped), ["arm"] * N, ["1.5"] * N, [str(k) for k in range(N)]]
+    return written(tmp_path / "of an instrument.csv", head, columns)
+
+
+def test_every_column_is_told_in_the_numbers_of_the_file(file: Path) -> None:
+    survey = surveyed(file)
+    facts = {one.name: one for one in survey.facts}
+    assert survey.recording.sample_rate == 500 and len(survey.recording) == N - 1 and survey.time == "t=time"
+    assert {name: one.unit for name, one in facts.items() if one.unit} == {
+        "force": "N", "angle": "deg", "wild": "mm", "half": "m", "clipped": "V", "level": "A",
+    }  # fmt: skip
+    assert facts["force"].is_set and "29 changes" in facts["force"].remarks[0]
+    assert facts["angle"].step == pytest.approx(0.01) and facts["angle"].high == pytest.approx(57.3, abs=0.01)
+    assert facts["angle"].reaches == pytest.approx(1.3, abs=0.5) and facts["angle"].remarks == ()
+    assert "starts over after 65536" in facts["counts"].remarks[0]
+    assert facts["wild"].remarks == ("10 samples are far from those about them, most often -1 mm",)
+    assert facts["half"].remarks == ("50 % of the rows have no number",)
+    assert len(facts["clipped"].remarks) == 1 and "largest value 0.08 V in 8 stretches" in facts["clipped"].remarks[0]
+    assert "'arm' is not a number" in facts["name"].remarks[0] and np.isnan(facts["name"].low)
+    assert facts["level"].remarks == ("never changes",)
+    assert facts["row"].is_even
+    assert lines_of_a_model(survey)[:2] == (
+        "force = model.input('force', 'N', hold='zoh')",
+        "angle = model.sensor('angle', 'rad')",
+    )
+
+
+def test_it_is_printed_and_drawn(file: Path, tmp_path: Path) -> None:
+    shown = pvid("look", file, "--figure", tmp_path / "columns.png")
+    assert shown.return_value == DONE and shown.stdout.startswith("of an instrument.csv: 2999 samples, 500 Hz, 5.996 s")
+    assert "never changes" in shown.stdout and "pvid: input: half has a sample every 2 ticks" in shown.stderr
+    assert (tmp_path / "columns.png").stat().st_size > 10_000
+
+
+FOREIGN = {
+    "dc_motor": {"t": "Time [ms]", "V": "Voltage (V)", "i": "Current [mA]", "phi": "shaft_rev"},
+    "kapitza": {"t": "time_us", "y": "height_mm", "phi": "encoder_deg"},
+    "battery_2rc": {"t": "stamp", "i": "current_mA", "v": "voltage_mV"},
+}
+IN_SI = {"ms": 1e-3, "us": 1e-6, "mm": 1e-3, "mA": 1e-3, "mV": 1e-3, "V": 1, "rev": 2 * np.pi, "deg": np.pi / 180}
+
+
+@pytest.mark.parametrize("mechanism", ["dc_motor", "kapitza", "battery_2rc"])
+@pytest.mark.parametrize("foreign", [False, True])
+def test_the_command_that_is_printed_identifies(mechanism: str, foreign: bool, tmp_path: Path) -> None:
+    run, file = tmp_path / "simulated.csv", tmp_path / "recorded.csv"
+    length = () if mechanism == "battery_2rc" else ("--duration", "12")
+    assert pvid("model", "simulate", mechanism, run, *length).return_value == DONE
+    own = run.read_text(encoding="utf-8").splitlines()
+    table = np.loadtxt(own[1:], delimiter=",")
+    names = own[0].split(",")
+    if foreign:
+        names = [FOREIGN[mechanism][one] for one in names]
+        table /= [IN_SI.get(unit_of_name(one), 1) for one in names]
+    np.savetxt(file, table, "%.12g", ",", header=",".join(names), comments="")
+    found = proposals(surveyed(file))
+    assert found[0].mechanism == mechanism and bool(found[0].columns) == foreign
+    command = shlex.split(found[0].command(str(file)))[1:]
+    command = [one.replace("l1=0.00", "l1=0.3") for one in command]
+    answer = json.loads(pvid(*command, "--json", "--no-refine").stdout)
+    assert answer["identified"]
+    for name, truth in simulated_rig(mechanism).truth.items():
+        one = answer["parameters"][name]
+        assert one["value"] is None or abs(one["value"] - truth) < 5 * one["se"], name
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("angle_deg", "deg"),
+        ("h (mm)", "mm"),
+        ("speed_rpm", "rpm"),
+        ("i [A]", "A"),
+        ("motor_a", ""),
+        ("theta_m", ""),
+        ("x", ""),
+    ],
+)
+def test_a_unit_in_a_name_is_one_beyond_doubt(name: str, unit: str) -> None:
+    assert unit_of_name(name) == ("rev/min" if unit == "rpm" else unit)
+
+
+def test_what_is_no_table_is_one_sentence(tmp_path: Path) -> None:
+    words = tmp_path / "notes.csv"
+    words.write_text("only words\nand more\n", encoding="utf-8")
+    with pytest.raises(PvidError, match="has no line of two numbers or more"):
+        pvid("look", words)
+    with pytest.raises(PvidError, match="does not exist"):
+        pvid("look", tmp_path / "none.csv")
+    with pytest.raises(PvidError, match="is a log of a board"):
+        pvid("look", tmp_path / "run.pvlog")
+
+
+def test_stamps_since_1970_in_a_compressed_file_are_in_their_unit(tmp_path: Path) -> None:
+    stamps = [str(1_700_000_000_123_456_789 + 2_000_000 * k) for k in range(N)]
+    plain = written(tmp_path / "topic.csv", "%time,field.x", [stamps, numbers(SLOW)])
+    packed = tmp_path / "topic.csv.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    survey = surveyed(packed)
+    assert survey.time == "t=time:ns" and survey.recording.sample_rate == 500
