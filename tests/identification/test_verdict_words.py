@@ -22,6 +22,8 @@ from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
 from pvid.identification.judge import PREDICTED
 from pvid.identification.road import identified
+from pvid.identification.values import values_of
+from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Reason, Verdict, of_width
 from pvid.oracle.weak.words import WIDE, Word, of_warning
@@ -118,3 +120,13 @@ def test_identifier_that_judges_as_a_whole_has_the_same_words() -> None:
         "usable",
         "not_identified",
     ]
+
+
+def test_an_output_whose_formula_has_no_value_is_not_identified_and_no_nan() -> None:
+    """rho2 of the pendulum is a root, of a negative number where d1 < 1 + d2."""
+    model = compiled_of("kapitza")
+    p, judged = np.array([30.0, 5.0, 5.6, 0.0]), [Judged()] * 4
+    values = values_of(model, p, 1e-6 * np.eye(4), np.zeros((0, 4)), judged, Verdict(), of_known=False)
+    assert values["rho2"].value is None and values["rho2"].status == "not_identified"
+    assert values["rho2"].reason == "its formula has no real value at these parameters"
+    assert values["g"].value == pytest.approx(9.0) and values["l2"].value is not None

@@ -47,6 +47,7 @@ def test_values_that_lie_anywhere_have_no_step() -> None:
         for _ in range(5):
             assert resolution_of(random.standard_normal(n)) is None
     assert resolution_of(0.1 * SWING) is None
+    assert resolution_of([0, 1, 2, 3, 1e6, 1e6 + 0.37, 2e6, 2e6 + 1, 2e6 + 2]) is None  # far from one another
     assert resolution_of((0.1 * SWING).astype(np.float32)) is None
 
 

@@ -58,7 +58,7 @@ LONGEST_S = 60  # of processor time, of one command: the run is a few seconds lo
 _ASLEEP_S = 900  # of one command that does nothing
 _CHUNK = 1000  # mutants that are drawn one behind the other, by one process
 _MEMORY = 6 << 30  # of the process [bytes]
-_NO_NUMBER = re.compile(r"\b(nan|inf|NaN|Infinity)\b")
+_NO_NUMBER = re.compile(r"(?<!['\w])(nan|inf|NaN|Infinity)(?!['\w])")  # not where a note quotes a cell
 _ROWS = 3000  # of the run that is mutated
 
 
@@ -311,7 +311,8 @@ def _runs(draw: random.Random, subject: Subject) -> _Mutants:
             suffix = draw.choice(list(originals))
             mutant = Path(f"mutant{suffix}")
             mutant.write_bytes(mutated_run(originals[suffix], draw))
-        yield ["identify", str(mutant), "--rig", "run.toml", "--json"], mutant
+        look = draw.random() < _LOOKED_AT
+        yield ["look", str(mutant)] if look else ["identify", str(mutant), "--rig", "run.toml", "--json"], mutant
 
 
 def _commands(draw: random.Random, _: Subject) -> _Mutants:
@@ -486,10 +487,11 @@ _COLUMNS = (
     *("t=1,phi=2,i=3", "phi=phi:deg", "phi=phi:rev/0", "t=t:1e300", "t=t:1e-300", "y=-y", "y=y:-mm", "t", "=", "a=b=c"),
     *("t=99", "t=0", "phi=y,y=phi", "phi=t", "t=phi", "t=t:nan", "t=t:inf", "phi=phi:", "", "y=y:um,y=y:mm"),
 )
+_LOOKED_AT = 0.3  # of the runs
 # Commands that neither record nor emulate, and end by themselves.
 _TRIED = (
     *("identify", "validate", "compare", "tune", "plot", "design", "tables", "models", "schema", "verify", "export"),
-    *("layout", "model check", "model predict", "model simulate", "log"),
+    *("look", "layout", "model check", "model predict", "model simulate", "log"),
 )
 _WORDS = {"--columns": _COLUMNS, "--set": _SETTINGS, "--web": _HOSTS, "--live": _HOSTS, "--on": _PORTS}
 _GOOD = {"--rig": "run.toml", "--run": "run.csv", "--duration": "3"}

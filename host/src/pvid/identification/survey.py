@@ -321,6 +321,7 @@ def _reaches(x: Float, rate: float) -> float | None:
     if n < MIN_ROWS:
         return None
     t = np.linspace(-1, 1, n)
+    x = x / np.abs(x).max()
     flat = x - np.polynomial.Polynomial.fit(t, x, 1)(t)
     power = np.abs(np.fft.rfft(flat * np.hanning(n))) ** 2
     noise = float(np.median(power[len(power) // 2 :]))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,9 +18,6 @@ from pvid.model.evaluation import numpy_function
 from pvid.oracle.weak.identify import Identified, given
 from pvid.oracle.weak.verdict import Judged, Verdict
 from pvid.oracle.weak.words import WIDE, Word, worst
-
-if TYPE_CHECKING:
-    pass
 
 Float = npt.NDArray[np.float64]
 
@@ -101,6 +98,8 @@ def values_of(
         used = [of for symbol, of in zip(model.p, judged, strict=True) if one.value.has(symbol)]
         missing = next((of for of in used if of.status == "not_identified"), Judged())
         slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := output_at(model, p, one))[1])
+        if missing.status != "not_identified" and not np.isfinite([found[0], *slope]).all():
+            missing = Judged("not_identified", "its formula has no real value at these parameters")
         word = worst(verdict.of(name) for name, p_k in zip(model.p_names, model.p, strict=True) if one.value.has(p_k))
         direct = np.zeros(len(gains))
         if of_known:

@@ -92,7 +92,8 @@ def _refined(levels: Float, guess: float) -> float | None:
     best = int(np.argmax(resultant))
     if resultant[best] < _LEAST_RESULTANT:
         return None
-    counts = np.rint(from_middle / steps[best])
+    step = float(steps[best])
+    counts = np.rint(from_middle / step)
     # the whole range gives the step to more digits, as long as the count is not lost
     for reach in (30, 300, len(levels)):
         inner = np.abs(counts) <= reach
