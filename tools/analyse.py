@@ -2,7 +2,7 @@
 """Static analysis of the firmware: gcc -fanalyzer, clang-tidy, cppcheck with its MISRA C:2012 add-on.
 
     tools/analyse.py            every finding, but for those that firmware/analysis.toml deviates from; exits 1 on one
-    tools/analyse.py FILE...    of these sources alone
+    tools/analyse.py FILE...    of these sources alone; of a rule with a limit, the findings in lines not yet committed
     tools/analyse.py --quick    clang-tidy gives up a function after a third of its paths, which is three times as fast
     tools/analyse.py --update   writes the numbers of findings into firmware/analysis.toml, too
 
@@ -30,6 +30,7 @@ import tomllib
 from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from kept import kept, preprocessed, version
@@ -52,7 +53,7 @@ PLATFORMS = {"host": "unix64", "cortex_m": "unix32", "riscv": "unix32", "avr": "
 # these, which include every header that chooses, once more with all macros.
 WHOLE = ("values_q31.c", "weak_step_f32.c")
 FEWER_PATHS = ("-Xclang", "-analyzer-config", "-Xclang", "max-nodes=75000")  # of 225000, of each function
-UNUSED = ("2.3", "2.4", "2.5")  # MISRA's rules of what a program never uses: of some sources they say nothing
+UNUSED = ("2.3", "2.4", "2.5")  # MISRA's rules of what a program never uses: of some of the sources they say nothing
 PACKAGES = {
     "gcc": "gcc",
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
@@ -72,6 +73,11 @@ class Finding:
     file: str  # from the top of the repository
     line: int
     text: str
+
+    @property
+    def is_new(self) -> bool:
+        """In a line that the last commit does not have."""
+        return self.source().strip() not in committed(self.file)
 
     def source(self) -> str:
         lines = (ROOT / self.file).read_text(encoding="utf-8").splitlines()
@@ -102,6 +108,15 @@ class Deviation:
 
     def key(self) -> str:
         return " ".join(filter(None, (self.tool, self.rule, ", ".join(self.files), self.line and f"`{self.line}`")))
+
+
+@cache
+def committed(file: str) -> frozenset[str]:
+    """The lines of a file in the last commit; none of a new file, and those that it has where there is no commit."""
+    there = subprocess.run(["git", "show", f"HEAD:{file}"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if there.returncode and "not a git repository" in there.stderr:
+        return frozenset(line.strip() for line in (ROOT / file).read_text(encoding="utf-8").splitlines())
+    return frozenset(line.strip() for line in there.stdout.splitlines())
 
 
 def units() -> list[Unit]:
@@ -294,7 +309,7 @@ def main() -> int:
     among = chosen(units(), files, parser)
     demand(PACKAGES)
 
-    findings = all_findings(among, given.quick)
+    findings = [one for one in all_findings(among, given.quick) if not files or one.rule not in UNUSED]
     known = deviations()
     faults = [str(finding) for finding in findings if not any(entry.covers(finding) for entry in known)]
     counted = [(entry, sum(entry.covers(finding) for finding in findings)) for entry in known]
@@ -307,10 +322,13 @@ def main() -> int:
         counts = [None if entry.category == "advisory" else count for entry, count in counted]
         DEVIATIONS.write_text(with_counts(DEVIATIONS.read_text(encoding="utf-8"), counts), encoding="utf-8")
     for entry, count in counted:
-        if not update and entry.category != "advisory" and count > entry.most:
-            found = "\n".join(f"  {finding}" for finding in findings if entry.covers(finding))
+        covered_now = [finding for finding in findings if entry.covers(finding)]
+        new = [finding for finding in covered_now if finding.is_new]
+        if not update and entry.category != "advisory" and (count > entry.most or (files and new)):
+            found = "\n".join(f"  {finding}" for finding in new or covered_now)
             says = f"{DEVIATIONS.name} says {entry.most}; fix it, or look and --update"
-            faults.append(f"{entry.key()}: {count} findings, {says}\n{found}")
+            what = f"{count} findings" if count > entry.most else f"{len(new)} in lines that are not committed"
+            faults.append(f"{entry.key()}: {what}, {says}\n{found}")
     if not files:
         REPORT.write_text(report_of(counted), encoding="utf-8")
     print("\n".join(faults))

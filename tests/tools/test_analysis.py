@@ -101,6 +101,21 @@ def test_required_rule_is_not_deviated_from_more_often_than_written(copy: Path) 
     assert "1 findings, analysis.toml says 0" in done.stdout
 
 
+def test_of_one_source_the_findings_in_new_lines_are_named(copy: Path) -> None:
+    """How many a rule has in all, one source does not tell."""
+    git = ["git", "-C", str(copy), "-c", "user.name=a", "-c", "user.email=a@b"]
+    for command in (["init", "-q"], ["add", "firmware"], ["commit", "-qm", "before"]):
+        subprocess.run([*git, *command], check=True)
+    source = copy / "firmware" / "src" / "number" / "layout.c"
+    before = source.read_text(encoding="utf-8")
+    assert "not committed" not in run(copy, "firmware/src/number/layout.c").stdout
+    wider = "uint32_t pvid_wider(uint16_t a, uint16_t b)\n{\n    const uint32_t both = a + b;\n    return both;\n}\n"
+    source.write_text(f"{before}\nuint32_t pvid_wider(uint16_t a, uint16_t b);\n{wider}", encoding="utf-8")
+    done = run(copy, "firmware/src/number/layout.c")
+    assert done.returncode == 1 and "misra 10.6" in done.stdout
+    assert re.search(r"\d in lines that are not committed.*\n  firmware/src/number/layout.c:\d+: misra", done.stdout)
+
+
 def test_every_header_that_chooses_by_a_macro_is_read_with_it() -> None:
     tools = {**runpy.run_path(str(ROOT / "tools" / "units.py")), **runpy.run_path(str(ROOT / "tools" / "analyse.py"))}
     read, choosing = set(), set()
