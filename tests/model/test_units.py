@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import pytest
+import sympy as sp
+from sympy.physics import units as si
 
 from pvid.base.errors import PvidError
-from pvid.model import Model, cos, sin, units
+from pvid.base.units import BASE, unit_of
+from pvid.model import Model, cos, sin
 from pvid.model.units import dimension_of_unit
 
 FINE = 1e-4
@@ -29,7 +32,8 @@ def test_equal_units_are_equal(one: str, other: str) -> None:
         ("N*", "no unit"),
         ("import", "no unit"),
         ("m**-", "no unit"),
-        ("2*m", 'use "m"'),
+        ("2*m", "no unit"),
+        ("rev/s", 'use "1/s"'),
         ("kilo", "no unit"),
     ],
 )
@@ -86,8 +90,25 @@ def test_units_of_outputs_and_of_a_lagrangian_are_checked() -> None:
     assert len(model.compiled().rows) == 1
 
 
-@pytest.mark.parametrize("name", sorted(units._COHERENT))
-def test_coherent_units_are_those_of_sympy(name: str) -> None:
-    """The table that spares loading them."""
-    if name not in ("Ohm", "count"):
-        assert units._of_sympy(name) == (dimension_of_unit(name), 1)
+SYMPY = {"min": "minute", "h": "hour", "in": "inch", "lb": "pound", "L": "liter"}
+
+
+@pytest.mark.parametrize("name", [*BASE[:-1], *"g N J W V Pa Hz C ohm F H Wb T S bar psi ft min h in lb L".split()])
+def test_units_are_those_of_sympy(name: str) -> None:
+    base = (si.kilogram, si.meter, si.second, si.ampere, si.kelvin, si.mole, si.candela)
+    unit = unit_of(name)
+    assert unit is not None
+    of_sympy = si.convert_to(getattr(si, SYMPY.get(name, name)), base)
+    ours = sp.prod([one**power for one, power in zip(base, unit.dimension, strict=False)])
+    assert float(of_sympy / ours) == pytest.approx(float(unit.scale), rel=1e-6)  # psi in six digits
+
+
+@pytest.mark.parametrize("text", ["m*/s", "*/", "m**/s", "m*", "/s", "m//s"])
+def test_a_unit_does_not_end_a_comment_of_c(text: str) -> None:
+    with pytest.raises(PvidError, match="no unit"):
+        dimension_of_unit(text)
+
+
+def test_powers_are_fractions_too() -> None:
+    assert dimension_of_unit("m^(5/2)/s") * dimension_of_unit("1/m^(1/2)") == dimension_of_unit("m^2/s")
+    assert dimension_of_unit("V/(A^2*s)") == dimension_of_unit("V/A^2/s") == dimension_of_unit("V A^-2 s^-1")

@@ -6,28 +6,19 @@ scale. rad is a pure number.
 
 from __future__ import annotations
 
-import ast
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
 import sympy as sp
 
+from pvid.base.units import BASE, unit_of
 from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import TIME, Integral, Jet, sgn
 
-_BASE_NAMES = ("kg", "m", "s", "A", "K", "mol", "cd")
-_DIMENSIONS = ("mass", "length", "time", "current", "temperature", "amount_of_substance", "luminous_intensity")
-# Exponents of the base units in the usual coherent ones. All others are those of sympy, whose units take a seventh of a
-# second to load.
-_COHERENT: dict[str, tuple[int, ...]] = {
-    **{name: tuple(int(name == one) for one in _BASE_NAMES) for name in _BASE_NAMES},
-    **{"rad": (), "count": (), "Hz": (0, 0, -1), "N": (1, 1, -2), "Pa": (1, -1, -2), "J": (1, 2, -2), "W": (1, 2, -3)},
-    **{"C": (0, 0, 1, 1), "V": (1, 2, -3, -1), "ohm": (1, 2, -3, -2), "Ohm": (1, 2, -3, -2), "H": (1, 2, -2, -2)},
-    **{"F": (-1, -2, 4, 2), "S": (-1, -2, 3, 2), "Wb": (1, 2, -2, -1), "T": (1, 0, -2, -1)},
-}
-_ALSO = {"pct": "percent", "min": "minute", "deg": "degree"}
+_BASE_NAMES = BASE[:-1]
 
 
 @dataclass(frozen=True)
@@ -100,60 +91,15 @@ def dimension_of_unit(text: str) -> Dimension:
     """
     if not text.strip():
         return NUMBER
-    try:
-        dimension, scale = _measured(ast.parse(text.replace("^", "**").strip(), mode="eval").body)
-    except (SyntaxError, ValueError, TypeError) as error:
-        raise ModelError(f'"{text}" is no unit: write it as in "kg*m^2/s", with units of SI') from error
+    unit = unit_of(text.strip().replace("**", "^"))
+    if unit is None or text.strip()[0] in "*/":
+        raise ModelError(f'"{text}" is no unit: write it as in "kg*m^2/s", with units of SI')
+    dimension = Dimension(tuple(map(sp.Rational, unit.dimension[:-1])))
+    scale = float(unit.scale) * math.pi**unit.turns
     if scale != 1:
-        coherent = "rad" if dimension == NUMBER else str(dimension)
-        raise ModelError(f'the unit "{text}" is {_plain(scale)} {coherent}: equations are in SI, use "{coherent}"')
+        coherent = "rad" if dimension == NUMBER and unit.turns else str(dimension)
+        raise ModelError(f'the unit "{text}" is {scale:.6g} {coherent}: equations are in SI, use "{coherent}"')
     return dimension
-
-
-def _plain(scale: sp.Expr) -> str:
-    return f"{float(scale):.6g}"
-
-
-def _measured(node: ast.expr) -> tuple[Dimension, sp.Expr]:
-    """Dimension, and how many coherent units it is."""
-    if isinstance(node, ast.BinOp):
-        (left, by), (right, number) = _measured(node.left), _measured(node.right)
-        if isinstance(node.op, ast.Mult):
-            return left * right, sp.simplify(by * number)
-        if isinstance(node.op, ast.Div):
-            return left * right.power(sp.Integer(-1)), sp.simplify(by / number)
-        if isinstance(node.op, ast.Pow) and right == NUMBER and number.is_Rational:
-            return left.power(number), sp.simplify(by**number)
-    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        dimension, scale = _measured(node.operand)
-        return dimension, -scale
-    elif isinstance(node, ast.Constant) and isinstance(node.value, int):
-        return NUMBER, sp.Integer(node.value)
-    elif isinstance(node, ast.Name):
-        exponents = _COHERENT.get(node.id)
-        return _of_sympy(_ALSO.get(node.id, node.id)) if exponents is None else (_of(*exponents), sp.Integer(1))
-    raise ValueError(ast.dump(node))
-
-
-def _of(*exponents: int) -> Dimension:
-    whole = (*exponents, *(0,) * (len(_BASE_NAMES) - len(exponents)))
-    return Dimension(tuple(map(sp.Integer, whole)))
-
-
-def _of_sympy(name: str) -> tuple[Dimension, sp.Expr]:
-    """Dimension of a unit that sympy has, and how many coherent units it is."""
-    from sympy.physics import units as si
-    from sympy.physics.units.systems.si import dimsys_SI
-
-    unit = getattr(si, name, None)
-    if not isinstance(unit, si.Quantity):
-        raise ValueError(name)
-    exponents = dimsys_SI.get_dimensional_dependencies(si.systems.SI.get_quantity_dimension(unit))
-    by_name = {str(getattr(one, "name", one)): number for one, number in exponents.items()}
-    dimension = Dimension(tuple(sp.sympify(by_name.get(one, 0)) for one in _DIMENSIONS))
-    base = (si.kilogram, si.meter, si.second, si.ampere, si.kelvin, si.mole, si.candela)
-    coherent = sp.prod([one.scale_factor**number for one, number in zip(base, dimension.of, strict=True)])
-    return dimension, sp.simplify(unit.scale_factor / coherent)
 
 
 def dimension_of(expression: sp.Expr, of: Mapping[str, Dimension]) -> Dimension | None:

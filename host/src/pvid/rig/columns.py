@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.units import Scale, is_unit, scale_to, spelled, usual
 from pvid.base.wording import listed, shown
-from pvid.rig.units import Scale, is_unit, scale_to, spelled, usual
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -123,7 +123,7 @@ class Columns:
         """Reads `SIGNAL=COLUMN[:UNIT],...`.
 
         COLUMN is a name in the file's header, in double quotes where it has a comma, a colon or a quote of its own
-        (which is doubled), or a number, 1 for the first column. UNIT is one of `pvid.rig.units`, or a number of SI
+        (which is doubled), or a number, 1 for the first column. UNIT is one of `pvid.base.units`, or a number of SI
         units. A minus sign in front of it turns the sign, `/N` behind it divides: `rev/4096` for counts of an encoder,
         `-mm` for a height that grows downwards.
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice
 
+from pvid.base.units import is_unit
 from pvid.rig.cells import is_missing, is_number
 from pvid.rig.times import is_time
-from pvid.rig.units import is_unit
 
 _NO_DATA = re.compile(r"[ \t]*(?:(?:[#%]|//|sep=).*)?")
 _MARKS = "#%/; \t"  # of a comment

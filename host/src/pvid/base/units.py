@@ -1,6 +1,6 @@
-"""Units that a column of a file may have, and what one of them is in the SI unit of a signal.
+"""Units of columns and of quantities of a model, and what one of them is in SI.
 
-A unit is a product of powers: ``mN*m``, ``deg/s``, ``rev/min``, ``m/s^2``, ``N m``, ``1/min``. Angles count as a
+A unit is a product of powers: ``mN*m``, ``deg/s``, ``rev/min``, ``m/s^2``, ``N m``, ``V/(A*s)``. Angles count as a
 dimension of their own, so that turns a second and oscillations a second are not confused. A scale is a fraction and a
 power of pi: divided by an integer, a decimal number gives the same bits as the decimal number in SI (7 ms = 0.007 s).
 """
@@ -13,22 +13,22 @@ import re
 from dataclasses import dataclass
 from fractions import Fraction
 
-_DIMENSIONS = ("m", "kg", "s", "A", "K", "rad")
-_NUMBER = (0,) * len(_DIMENSIONS)
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+_NUMBER = (0,) * len(BASE)
 
 
 @dataclass(frozen=True)
 class Unit:
-    """What one of a unit is in coherent units of SI: scale * pi^turns, of the dimension m^a kg^b s^c A^d K^e rad^f."""
+    """What one of a unit is in coherent units of SI: scale * pi^turns, with the exponents of BASE."""
 
     scale: Fraction
-    dimension: tuple[int, ...]
-    turns: int = 0
+    dimension: tuple[int | Fraction, ...]
+    turns: int | Fraction = 0
 
-    def times(self, other: Unit, power: int = 1) -> Unit:
+    def times(self, other: Unit, power: int | Fraction = 1) -> Unit:
         """This times a power of another."""
         dimension = tuple(a + power * b for a, b in zip(self.dimension, other.dimension, strict=True))
-        return Unit(self.scale * other.scale**power, dimension, self.turns + power * other.turns)
+        return Unit(self.scale * Fraction(other.scale**power), dimension, self.turns + power * other.turns)
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,7 @@ class Scale:
 
 
 _ONE = Unit(Fraction(1), _NUMBER)
-_BASE = {
-    name: Unit(Fraction(1), tuple(int(k == place) for k in range(len(_DIMENSIONS))))
-    for place, name in enumerate(_DIMENSIONS)
-}
+_BASE = {name: Unit(Fraction(1), tuple(int(name == one) for one in BASE)) for name in BASE}
 # In coherent units, or in those before them; what follows the sign | takes the prefixes of SI too.
 _DERIVED: dict[str, tuple[str, int | Fraction]] = {
     "|g": ("kg", Fraction(1, 1000)),
@@ -76,7 +73,7 @@ _DERIVED: dict[str, tuple[str, int | Fraction]] = {
     "lb": ("kg", Fraction(45_359_237, 10**8)),
 }
 _PREFIXES = {"n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "h": 2, "k": 3, "M": 6, "G": 9}
-_GRAVITY = Unit(Fraction(980_665, 100_000), (1, 0, -2, 0, 0, 0))
+_GRAVITY = Unit(Fraction(980_665, 100_000), (0, 1, -2, 0, 0, 0, 0, 0))
 # Other spellings, in lower case but where the case decides.
 _SPELLINGS = {
     "µ": "u", "μ": "u", "Ω": "ohm", "\u2126": "ohm", "·": "*", "⋅": "*", "×": "*", "²": "^2", "³": "^3", "⁻¹": "^-1",
@@ -117,7 +114,8 @@ _WORDS = {
     "": "1 - count counts dimensionless none unitless",
 }
 _SYMBOL_OF = {word: symbol for symbol, words in _WORDS.items() for word in words.split()}
-_FACTOR = re.compile(r"(?P<of>[A-Za-z_%]+)(?:\^?(?P<power>[+-]?\d+))?|1")
+_DIVIDED = str.maketrans("*/ .", "/*//")
+_FACTOR = re.compile(r"(?P<of>[A-Za-z_%]+)(?:\^?(?P<power>[+-]?\d+(?:\|\d+)?))?|1")
 # Of a signal in an SI unit, what a refusal proposes.
 _USUAL = {
     "s": ("s", "ms", "us", "ns", "min", "h"),
@@ -189,11 +187,16 @@ def spelled(text: str) -> str:
 
 @functools.cache
 def unit_of(text: str) -> Unit | None:
-    """A product of powers; None where it is none. Everything behind a / up to the next * or blank is divided by."""
+    """A product of powers; None where it is none. What is behind a / up to the next * or blank divides, or what is in
+    brackets behind it."""
     if text == "":
         return _ONE
+    if len(text) > 1 and re.search(r"[*/]([*/]|$)", text):
+        return None
     found, power = _ONE, 1
-    for sign, part in re.findall(r"(^|[*/ .]|\Z)([^*/ .]*)", text.replace(" / ", "/").replace(" * ", "*")):
+    text = re.sub(r"\^\(([+-]?\d+)/(\d+)\)", r"^\1|\2", text)  # m^(1/2)
+    text = re.sub(r"/\(([^()]*)\)", lambda inner: "/" + inner[1].translate(_DIVIDED), text.replace(" / ", "/"))
+    for sign, part in re.findall(r"(^|[*/ .])([^*/ .]*)", text.replace(" * ", "*")):
         if not part:
             continue
         part = part.strip("()")
@@ -202,7 +205,7 @@ def unit_of(text: str) -> Unit | None:
         one = None if match is None else _symbol(match["of"] or "1")
         if match is None or one is None:
             return None
-        found = found.times(one, power * int(match["power"] or 1))
+        found = found.times(one, power * Fraction((match["power"] or "1").replace("|", "/")))
     return found
 
 
