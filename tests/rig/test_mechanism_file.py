@@ -85,7 +85,9 @@ def test_settings_come_before_the_file() -> None:
         ("sample_rate = 5", "the mechanism is missing"),
         ("[model]\nname='x'\n[known]\ng='9'", "known.g must be a number, not '9'"),
         ("[model]\nname='x'\n[known]\ng=nan", "known.g must be a number, not 'nan'"),
-        ("[model]\nname='x'\n[sensor]\nphi=3", "phi must be a table"),
+        ("[model]\nname='x'\n[sensor]\nphi=3", "sensor.phi must be a table, [sensor.phi], not '3'"),
+        ("sensor = 3\n[model]\nname='x'", "sensor must be a table, [sensor], not '3'"),
+        ("sensor = []\n[model]\nname='x'", "sensor must be a table, [sensor], not '[]'"),
         (
             "[model]\nname='x'\n[sensor.phi]\nbits=3",
             "'bits' is not a key: resolution, noise, gain_sd, neglected, delay and reach are",

@@ -26,7 +26,7 @@ A key that the model does not have becomes a PvidError that names it and lists t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
@@ -44,6 +44,7 @@ if TYPE_CHECKING:  # it loads SymPy
 
 _Read = TypeVar("_Read")
 
+_KEYS = ("sample_rate", "clock_sd", "model", "known", "known_sd", "sensor", "nominal", "identifier", "refine")
 _OF_AN_INPUT = ("gain_sd", "reach")
 OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected", "delay", "reach")
 _POSITIVE = ("reach", "sample_rate")
@@ -91,46 +92,23 @@ class MechanismRig:
     @classmethod
     def of_document(cls, document: Mapping[str, Any], asked: str | Path | None = None) -> MechanismRig:
         """From the tables of a text; see `parse`. `asked`: the mechanism of this call, in place of the text's."""
-        known_keys = (
-            "sample_rate",
-            "clock_sd",
-            "model",
-            "known",
-            "known_sd",
-            "sensor",
-            "nominal",
-            "identifier",
-            "refine",
-        )
         for key in document:
-            if key not in known_keys:
-                raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(known_keys)} are")
+            if key not in _KEYS:
+                raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(_KEYS)} are")
         model = _table(document, "model").get("name") if asked is None else asked
         if not isinstance(model, str | Path):
             raise PvidError('the mechanism is missing: [model] name = "dc_motor", or the path of a model file')
         top = _numbers({key: document[key] for key in ("sample_rate", "clock_sd") if key in document}, "")
-        sensors = {
-            name: _numbers(_table(_table(document, "sensor"), name), f"sensor.{name}")
-            for name in document.get("sensor", {})
-        }
-        for name, keys in sensors.items():
-            for key in keys:
-                if key not in OF_A_SENSOR:
-                    raise PvidError(f"sensor.{name}: {shown(key)} is not a key: {listed(OF_A_SENSOR)} are")
-        identifier = _numbers(_table(document, "identifier"), "identifier")
-        for key in identifier:
-            if key not in OF_THE_IDENTIFIER:
-                raise PvidError(f"identifier: {shown(key)} is not a key: {listed(OF_THE_IDENTIFIER)} are")
+        sensors = _table(document, "sensor")
         return cls(
             model,
-            top.get("sample_rate"),
-            _numbers(_table(document, "known"), "known"),
-            sensors,
-            _numbers(_table(document, "nominal"), "nominal"),
-            _numbers(_table(document, "known_sd"), "known_sd"),
-            identifier,
-            _switches(_table(document, "refine"), "refine"),
-            top.get("clock_sd"),
+            known=_numbers(_table(document, "known"), "known"),
+            sensor={one: _numbers(_table(sensors, one, "sensor."), f"sensor.{one}", OF_A_SENSOR) for one in sensors},
+            nominal=_numbers(_table(document, "nominal"), "nominal"),
+            known_sd=_numbers(_table(document, "known_sd"), "known_sd"),
+            identifier=_numbers(_table(document, "identifier"), "identifier", OF_THE_IDENTIFIER),
+            refine=_switches(_table(document, "refine"), "refine"),
+            **top,
         )
 
     def text(self) -> str:
@@ -277,15 +255,17 @@ def with_settings(document: Mapping[str, Any], settings: Iterable[str]) -> dict[
     return changed
 
 
-def _table(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+def _table(document: Mapping[str, Any], name: str, inside: str = "") -> Mapping[str, Any]:
     table = document.get(name, {})
     if not isinstance(table, Mapping):
-        raise PvidError(f"{name} must be a table, [{name}], not {shown(str(table))}")
+        raise PvidError(f"{inside}{name} must be a table, [{inside}{name}], not {shown(str(table))}")
     return table
 
 
-def _numbers(table: Mapping[str, Any], place: str) -> dict[str, float]:
+def _numbers(table: Mapping[str, Any], place: str, keys: Collection[str] | None = None) -> dict[str, float]:
     for key, value in table.items():
+        if keys is not None and key not in keys:
+            raise PvidError(f"{place}: {shown(key)} is not a key: {listed(keys)} are")
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             name = f"{place}.{key}" if place else key
             raise PvidError(f"{name} must be a number, not {shown(str(value))}")
