@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.units import Scale, scale_to, spelled
 from pvid.identification.wild_samples import far_from_median
 from pvid.models.mechanisms import described
 from pvid.models.registry import names as shipped_names
@@ -23,7 +24,6 @@ from pvid.rig.run import LONG_BLANK_ROWS, MIN_ROWS, Recording, read_table, recor
 from pvid.rig.sensor_steps import resolution_of
 from pvid.rig.table import Table
 from pvid.rig.turns import counted_on
-from pvid.rig.units import Scale, scale_to, spelled
 
 Float = npt.NDArray[np.float64]
 
