@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from pvid.base.console import write_stderr
 from pvid.base.figure_file import format_of
@@ -39,9 +40,17 @@ def model_option(command: Command) -> Command:
     """Adds --model: parameter model."""
     return click.option(
         "--model",
+        shell_complete=_models_like,
         help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, else the shipped one with "
         "the signals of the columns]",
     )(command)
+
+
+def _models_like(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """The shipped mechanisms, and files."""
+    from pvid.models.registry import names
+
+    return [*(CompletionItem(one) for one in names() if one.startswith(incomplete)), CompletionItem(incomplete, "file")]
 
 
 def columns_option(command: Command) -> Command:

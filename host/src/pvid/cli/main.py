@@ -10,10 +10,12 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
 
 import click
+from click.shell_completion import CompletionItem
 
 from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, OWN_ERROR, write_stderr
 from pvid.base.errors import PvidError
@@ -21,7 +23,7 @@ from pvid.base.freed_memory import keep_freed
 from pvid.base.output import watch
 from pvid.base.packages import PACKAGES, installing
 from pvid.base.version import __version__
-from pvid.base.wording import reason
+from pvid.base.wording import reason, shown
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
     "Identify": {
@@ -140,6 +142,22 @@ class Commands(click.Group):
         module, attribute = _ELSEWHERE.get(cmd_name, (f"pvid.cli.{cmd_name}", "command"))
         command: click.Command = getattr(import_module(module), attribute)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As of click, which proposes names of commands that it holds; these are imported when they are used."""
+        name = args[0]
+        if not name.startswith("-") and self.get_command(ctx, name) is None and not ctx.resilient_parsing:
+            near = get_close_matches(name, self.list_commands(ctx), n=1, cutoff=0.5)
+            ctx.fail(f"there is no command {shown(name)}" + (f": did you mean {near[0]}?" if near else ""))
+        return super().resolve_command(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """The commands with their lines, none of which is imported for that."""
+        lines = {name: line for group in GROUPS.values() for name, line in group.items()}
+        names = [name for name in self.list_commands(ctx) if name.startswith(incomplete)]
+        return [CompletionItem(name, help=lines[name]) for name in names] or super().shell_complete(ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         present = self.list_commands(ctx)
