@@ -126,7 +126,7 @@ def values_for(field: Scalar, known: Range) -> st.SearchStrategy[Any]:
 
 
 @pytest.mark.parametrize("name", IDENTIFIERS)
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(data=st.data())
 def test_a_field_out_of_its_range_is_refused_by_name(
     name: str, shared: dict[str, Subject], samples: dict[str, Samples], data: Any
@@ -225,7 +225,7 @@ def odd_samples(draw: Callable[..., Any], samples: Samples) -> Samples:
 
 
 @pytest.mark.parametrize("name", ("weak",))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_accepted_configurations_stay_finite(
     name: str, shared: dict[str, Subject], samples: dict[str, Samples], data: Any
@@ -240,7 +240,7 @@ def test_accepted_configurations_stay_finite(
 
 
 @pytest.mark.parametrize("name", ("weak q31",))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(data=st.data())
 def test_fixed_point_core_keeps_its_bounds(
     name: str, shared: dict[str, Subject], samples: dict[str, Samples], data: Any

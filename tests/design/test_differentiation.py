@@ -138,7 +138,7 @@ def test_finite_differences_converge_at_their_order() -> None:
     stride=st.integers(1, 5),
     rate=st.floats(1.0, 1e4),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_stride_and_rate_only_scale_time(half: int, degree: int, stride: int, rate: float) -> None:
     bank = savitzky_golay(2 * half + 1, degree, stride)
     dense = savitzky_golay(2 * half + 1, degree)

@@ -74,7 +74,7 @@ def well_laid_out(number: int, payload: bytes) -> bool:
     return True
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(frames)
 def test_c_and_python_encode_the_same_bytes(frame: tuple[int, int, int, bytes]) -> None:
     encoded = link.encode_raw(*frame)
@@ -116,7 +116,7 @@ def damaged(draw: st.DrawFn) -> bytes:
     return bytes(data)
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(damaged(), st.lists(st.integers(1, 50), max_size=20))
 def test_damage_is_judged_alike_however_it_is_cut(data: bytes, cuts: list[int]) -> None:
     decoder, _ = assert_same_as_c(data)
@@ -127,7 +127,7 @@ def test_damage_is_judged_alike_however_it_is_cut(data: bytes, cuts: list[int]) 
     assert pieces.counters == decoder.counters
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(max_size=3000))
 def test_after_any_garbage_the_next_frame_comes_through(garbage: bytes) -> None:
     decoder = link.Decoder()

@@ -21,7 +21,7 @@ Float = npt.NDArray[np.float64]
 SUFFIXES = (".csv", ".csv.gz", ".npz", ".parquet")
 
 # Reading hostile files takes as long as the disk does.
-relaxed = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+relaxed = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def run_of(rows: int = 50, rate: float = 1000.0) -> Run:

@@ -21,7 +21,7 @@ Float = npt.NDArray[np.float64]
 RATE = 1000.0
 LSB = 2 * np.pi / 2**14  # of the encoder; its noise is half of it
 
-relaxed = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+relaxed = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def phi_at(t: Float) -> Float:

@@ -22,7 +22,7 @@ PHI = np.round(0.1 * np.sin(30.0 * T), 6)
 Y = np.round(0.01 * np.cos(20.0 * T), 6)
 
 # Reading files takes as long as the disk does.
-relaxed = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+relaxed = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def table(separator: str = ",", decimal: str = ".", header: str = "t,phi,y", end: str = "\n", close: str = "") -> str:
@@ -178,7 +178,6 @@ def test_a_wrong_map_is_one_sentence(text: str, part: str) -> None:
 
 
 @given(st.text(max_size=40))
-@settings(deadline=None)
 def test_any_map_is_read_or_refused_in_a_sentence(text: str) -> None:
     try:
         columns_of(text)
