@@ -1,6 +1,6 @@
 """Mutated rig files, runs and command lines, in short form: nothing but answers and sentences comes back.
 
-The long form is `pvid bench attack`; its figures are in tests/ATTACK.md.
+The long form is `pvid bench attack`; its figures are in attack.csv.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from bench.attack import (
     rig_text,
     written_subject,
 )
+from bench.figures import results_of
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import MOST_BYTES, toml_document
 from pvid.cli.identify_run import recording_of
@@ -45,13 +46,10 @@ def test_mutants_get_answers_and_sentences_alone(kind: str, tmp_path: Path) -> N
     assert tally.codes[0] > 0  # some are answered
 
 
-def test_page_counts_every_mutant() -> None:
-    text = (Path(__file__).parents[1] / "ATTACK.md").read_text()
-    lines = text.partition("<!-- attack -->")[2].partition("<!-- /attack -->")[0].strip().splitlines()
-    assert tuple(cell.strip() for cell in lines[0].strip("|").split("|")) == HEADER
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
-    assert len(rows) == len(KINDS)
-    for _, mutants, _, answered, nothing, refused, defects, longest_s in rows:
+def test_the_table_of_results_counts_every_mutant() -> None:
+    kept = results_of("attack")
+    assert kept.header == HEADER and len(kept.rows) == len(KINDS)
+    for _, mutants, _, answered, nothing, refused, defects, longest_s in kept.rows:
         assert int(answered) + int(nothing) + int(refused) == int(mutants) >= 500
         assert int(defects) == 0 and float(longest_s) < LONGEST_S
 

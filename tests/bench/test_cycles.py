@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bench.cycles import CLOCKS_MHZ, HEADER, row_of, rtl, same_bits, share
+from bench.figures import results_of
 from pvid.board.replay_image import ReplayReport
-from pvid.core.sources import ROOT
 
 HASHES = np.arange(7, 1007, dtype=np.uint32)
 REPORT = ReplayReport(
@@ -48,23 +48,15 @@ def test_the_core_comes_without_its_models_of_cells(tmp_path: Path) -> None:
     assert rtl(folder) == [f"+incdir+{folder}/include", f"{folder}/a.sv"]
 
 
-def _rows_of_the_page() -> list[list[str]]:
-    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
-    lines = page.partition("<!-- cycles -->\n")[2].partition("\n<!-- /cycles -->")[0].splitlines()
-    head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    assert tuple(head) == HEADER
-    return rows
-
-
-def test_the_page_follows_from_its_cycles() -> None:
-    rows = _rows_of_the_page()
-    assert len(rows) == 5
-    for _, _, ticks, mean, longest, *shares, bits in rows:
+def test_the_shares_of_the_table_follow_from_its_cycles() -> None:
+    kept = results_of("cycles")
+    assert kept.header == HEADER and len(kept.rows) == 5
+    for _, _, ticks, mean, longest, *shares, bits in kept.rows:
         assert bits == "equal" and 0 < int(mean) <= int(longest) and int(ticks) >= 1000
         assert [float(one) for one in shares] == [pytest.approx(share(int(mean), mhz), abs=0.006) for mhz in CLOCKS_MHZ]
 
 
 def test_stages_of_the_fpu_cost_cycles() -> None:
-    mean = {(title, fpu): int(cycles) for title, fpu, _, cycles, *_ in _rows_of_the_page()}
+    mean = {(title, fpu): int(cycles) for title, fpu, _, cycles, *_ in results_of("cycles").rows}
     slower = [title for title, fpu in mean if fpu == "latency 2"]
     assert len(slower) == 2 and all(mean[one, "latency 2"] > mean[one, "latency 0"] for one in slower)

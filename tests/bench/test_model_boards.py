@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from bench.figures import results_of
 from bench.model_boards import HEADER, USUAL, differs, played, reason_for_no_figure, row_of, rows
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
-from pvid.core.sources import ROOT
 
 
 def test_a_board_of_each_instruction_set_has_a_row_for_each_core() -> None:
@@ -52,13 +52,11 @@ def test_a_fault_is_no_reason_for_a_missing_figure(fault: str) -> None:
         reason_for_no_figure(PvidError(f"mps2-an386: {fault}"))
 
 
-def test_the_page_has_every_row_and_equal_bits() -> None:
-    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
-    lines = page.partition("<!-- model-boards -->\n")[2].partition("\n<!-- /model-boards -->")[0].splitlines()
-    head, _, *shown = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    assert tuple(head) == HEADER
-    assert [row[:2] for row in shown] == [[f"{board.core} ({board.name})", core] for board, core in rows(USUAL)]
-    for row in shown:
+def test_the_table_of_results_has_every_row_and_equal_bits() -> None:
+    kept = results_of("model-boards")
+    assert kept.header == HEADER
+    assert [row[:2] for row in kept.rows] == [(f"{board.core} ({board.name})", core) for board, core in rows(USUAL)]
+    for row in kept.rows:
         played_cells = [cell for cell in row[2:-1] if not cell.startswith("no ")]
         assert row[-1] == ("equal" if played_cells else "-") and all(int(cell) > 100 for cell in played_cells)
         assert len(played_cells) == len(row) - 3 or row[0].startswith("ATmega")

@@ -1,10 +1,10 @@
-"""Instructions of a tick by function: their sum is the whole, and host/docs/benchmarks/cost.md has them as measured."""
+"""Instructions of a tick by function: their sum is the whole, and the table of results has them as measured."""
 
 from __future__ import annotations
 
 import pytest
-from conftest import ROOT
 
+from bench.figures import results_of
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.profile import HEADER, Profile, profile, refined, table_rows
@@ -35,13 +35,10 @@ def test_only_what_a_tick_calls_is_counted(profiles: dict[str, Profile], form: s
     assert not names & {"main", "pvid_port_instructions", "pvid_fnv_estimator_f32", f"{own}_fnv_f32", f"{own}_init_f32"}
 
 
-def test_the_readme_shows_what_is_measured(profiles: dict[str, Profile]) -> None:
-    text = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
-    table = text.split("<!-- profile -->\n")[1].split("<!-- /profile -->")[0].splitlines()[2:]
-    shown = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
-    measured = table_rows(profiles)
+def test_the_table_of_results_has_what_is_measured(profiles: dict[str, Profile]) -> None:
+    shown, measured = results_of("profile").rows, table_rows(profiles)
     at = HEADER.index("instructions")
-    assert [row[:at] for row in shown] == [list(row[:at]) for row in measured]
+    assert [row[:at] for row in shown] == [row[:at] for row in measured]
     assert [int(row[at]) for row in shown] == pytest.approx([int(row[at]) for row in measured], rel=0.02, abs=1)
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from conftest import ROOT
 
+from bench.figures import results_of
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31, sizes
 from pvid.board.boards import BOARDS, Board, run
@@ -133,13 +134,11 @@ def test_the_weak_form_in_integers_keeps_its_limits(measured: Measured) -> None:
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:
     footprints = {configuration: footprint for configuration, (footprint, _) in measured.items()}
     over = sizes.over_budget(ROOT / "tests" / "budget.toml", footprints)
-    assert not over, "accept: ./tools/pvid sizes --budget tests/budget.toml --update host/docs/benchmarks/cost.md"
+    assert not over, "accept: ./tools/pvid sizes --budget tests/budget.toml --data host/docs/benchmarks"
 
 
-def test_the_readme_shows_what_is_measured(measured: Measured) -> None:
-    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8").splitlines()
-    rows = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in page if line.startswith("| ")}
-    shown = {row[:2]: row[2:] for row in rows}
+def test_the_table_of_results_has_what_is_measured(measured: Measured) -> None:
+    shown = {row[:2]: row[2:] for row in results_of("sizes").rows}
     for row in sizes.table_rows({configuration: footprint for configuration, (footprint, _) in measured.items()}):
         figures = [int(cell) for cell in shown[row[:2]]]
         assert figures == pytest.approx([int(cell) for cell in row[2:]], rel=0.02), row

@@ -5,19 +5,13 @@ from __future__ import annotations
 import pytest
 from conftest import ROOT
 
-from bench.mechanism_pages import errors_of
+from bench.figures import results_of
+from bench.mechanism_pages import ERRORS, errors_of
+from pvid.cli.results import Results
 from pvid.model.report import check_report
 from pvid.models.mechanisms import compiled_of, names, path_of
 
 DOCS = ROOT / "host" / "docs"
-TABLE = """
-<!-- errors -->
-| mechanism | parameter | RMS % |
-|---|---|---|
-| motor | R | 0.1 |
-| arm | I1 | 0.2 |
-<!-- /errors -->
-"""
 
 
 @pytest.mark.parametrize("name", names())
@@ -25,9 +19,11 @@ def test_a_page_shows_the_mechanism_as_it_is(name: str) -> None:
     text = (DOCS / "mechanisms" / f"{name}.md").read_text(encoding="utf-8")
     assert path_of(name)[1].read_text(encoding="utf-8").rstrip() in text, "write it anew: ./tools/pvid bench pages"
     assert check_report(compiled_of(name)).rstrip() in text, "write it anew: ./tools/pvid bench pages"
+    assert errors_of(results_of(ERRORS), name) in text, "write it anew: ./tools/pvid bench pages"
     assert (DOCS / "images" / "mechanisms" / f"{name}.png").is_file()
 
 
 def test_rows_of_one_mechanism_are_taken_from_the_table() -> None:
-    assert errors_of("errors", TABLE, "arm") == ["| parameter | RMS % |", "| --- | --- |", "| I1 | 0.2 |"]
-    assert errors_of("errors", TABLE, "boat") == []
+    table = Results(("mechanism", "parameter", "RMS %"), [("motor", "R", "0.1"), ("arm", "I1", "0.2")], {})
+    assert errors_of(table, "arm").splitlines() == ["| parameter | RMS % |", "|---|---|", "| I1 | 0.2 |"]
+    assert errors_of(table, "boat") == ""

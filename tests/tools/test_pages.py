@@ -30,7 +30,6 @@ extern const pvid_refine_config_f32 kapitza_refine_config_f32;
 # What the C of a page uses beside its headers: page, declarations.
 SURROUNDINGS = {
     "models.md": "#include <stdbool.h>\n#include <pvid/pvid.h>\nvoid use(const float *, const float *);\n",
-    "refine.md": SETTINGS,
     "tutorial.md": "#include <pvid/pvid.h>\nfloat force(void);\nfloat place(void);\n"
     "void show(const float *, const float *);\n",
     "firmware.md": SETTINGS + "float read_encoder(void);\nfloat read_pivot(void);\n"

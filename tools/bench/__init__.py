@@ -1,1 +1,1 @@
-"""Long measurements: commands of `./tools/pvid bench` and `./tools/pvid campaign`; not part of the package."""
+"""Long measurements: the commands of `./tools/pvid bench`; not part of the package."""

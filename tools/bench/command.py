@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,13 +17,15 @@ import click
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
-from pvid.cli.page_table import UPDATE, markdown, put_table
+from pvid.cli.page_table import UPDATE, put_table
+from pvid.cli.results import DATA, put_counts, put_results
 from pvid.core.native import Native
 from pvid.core.sources import build_folder
 from pvid.settings.enums import Core
 
 if TYPE_CHECKING:
     from bench.recorded_rigs import Rig
+    from bench.recordings import Source
 
 
 @click.group()
@@ -70,11 +73,21 @@ def bench_pages(names: tuple[str, ...], docs: Path) -> int:
     return DONE
 
 
+@bench.command(name="figures")
+def bench_figures() -> int:
+    """Draws the figures of the page of benchmarks, host/docs/benchmarks.md, and writes its figures in words."""
+    from bench.figures import write_page
+
+    write_page()
+    return DONE
+
+
 # ---- tables of cases: a row or some for each mechanism ----
 
 Rows = Iterable[tuple[str, ...]]
 Tables = Iterable[tuple[str, tuple[str, ...], Rows]]  # marker on the page, header, rows
 Advance = Callable[[], object]
+Make = Callable[[tuple[str, ...], int, Advance], Tables]
 
 
 @dataclass(frozen=True)
@@ -90,9 +103,22 @@ class Table:
 
     name: str
     about: str
-    make: Callable[[tuple[str, ...], int, Advance], Tables]
+    make: Make
     number: tuple[int, str, str] = (20, "--seeds", "Runs of each case.")
     usual: tuple[str, ...] = ()
+
+
+def _rows(module: str, *tables: tuple[str, str, str]) -> Make:
+    """Tables of a module of this folder: marker, name of the header, name of the function of the rows."""
+
+    def make(names: tuple[str, ...], number: int, advance: Advance) -> Tables:
+        found = import_module(f"bench.{module}")
+        return [
+            (marker, getattr(found, header), getattr(found, of)(names, number, advance))
+            for marker, header, of in tables
+        ]
+
+    return make
 
 
 def _of_mechanisms(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
@@ -101,114 +127,66 @@ def _of_mechanisms(names: tuple[str, ...], seeds: int, advance: Advance) -> Tabl
     return mechanisms.tables(names, seeds, seeds // 4, lambda _: advance())
 
 
-def _of_weak(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
-    from bench import weak
-
-    return [
-        ("weak", weak.HEADER, weak.table(names, seeds, advance)),
-        ("weak-q31", weak.FIXED_HEADER, weak.fixed_table(names, seeds, advance)),
-    ]
-
-
-def _of_refinement(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
-    from bench import refine_mechanisms as bench_of
-
-    return [
-        ("refine-mechanisms", bench_of.HEADER, bench_of.refined_rows(names, seeds, advance)),
-        ("refine-friction", bench_of.IMPERFECT, bench_of.friction_rows(names, seeds // 2)),
-    ]
-
-
-def _of_hard(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
-    from bench import hard
-
-    return [("hard", hard.HEADER, hard.rows(names, seeds, advance))]
-
-
-def _of_accidents(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
-    from bench import accidents
-
-    return [("accidents", accidents.HEADER, accidents.rows(names, seeds, advance))]
-
-
-def _of_longevity(names: tuple[str, ...], ticks: int, advance: Advance) -> Tables:
-    from bench import longevity
-
-    return [("longevity", longevity.HEADER, longevity.rows(names, ticks, advance))]
-
-
-def _of_methods(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
-    from bench import methods
-
-    return [("compare-methods", methods.HEADER, methods.rows(names, seeds, advance))]
-
-
-def _of_strong(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
-    from bench import strong_mechanisms as strong
-
-    return [("strong-mechanisms", strong.HEADER, strong.rows_of(names, advance))]
-
-
-def _of_strong_fixed(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
-    from bench import strong_mechanisms as strong
-
-    return [("strong-fixed", strong.FIXED_HEADER, strong.rows_of(names, advance, strong.fixed_row_of))]
-
-
-def _of_float(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
-    from bench import costs
-
-    return costs.float_tables(names, advance)
-
-
-def _of_fixed(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
-    from bench import costs
-
-    return costs.fixed_tables(names, advance)
-
-
-def _of_verify(names: tuple[str, ...], ticks: int, advance: Advance) -> Tables:
-    from bench import verifying
-
-    return [("verify", verifying.HEADER, verifying.rows(names, ticks, advance))]
-
-
 _ONCE = (1, "--runs", "Of each image.")
 TABLES = (
     Table("mechanisms", "Errors in float64 beside the Cramer-Rao bound, and of imperfect rigs.", _of_mechanisms),
-    Table("weak", "Errors of the weak form in C beside float64, and in fixed point beside float32.", _of_weak),
-    Table("refine-mechanisms", "Both stages in C: errors beside the Cramer-Rao bound.", _of_refinement),
-    Table("hard", "Coarse sensors, noise, little drive, no motion: what is published, and what is wrong.", _of_hard),
+    Table(
+        "weak",
+        "Errors of the weak form in C beside float64, and in fixed point beside float32.",
+        _rows("weak", ("weak", "HEADER", "table"), ("weak-q31", "FIXED_HEADER", "fixed_table")),
+    ),
+    Table(
+        "refine-mechanisms",
+        "Both stages in C: errors beside the Cramer-Rao bound.",
+        _rows(
+            "refine_mechanisms",
+            ("refine-mechanisms", "HEADER", "refined_rows"),
+            ("refine-friction", "IMPERFECT", "friction_rows"),
+        ),
+    ),
+    Table(
+        "hard",
+        "Coarse sensors, noise, little drive, no motion: what is published, and what is wrong.",
+        _rows("hard", ("hard", "HEADER", "rows")),
+    ),
     Table(
         "accidents",
         "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them.",
-        _of_accidents,
+        _rows("accidents", ("accidents", "HEADER", "rows")),
         (2, "--seeds", "Runs of each case."),
         ("kapitza", "rigid_body"),
     ),
     Table(
         "longevity",
         "Millions of ticks of every disturbance, with and without forgetting.",
-        _of_longevity,
+        _rows("longevity", ("longevity", "HEADER", "rows")),
         (1_000_000, "--ticks", "Of each run."),
     ),
     Table(
         "verify",
         "What `pvid verify` takes for a long log, of each identifier that a board streams.",
-        _of_verify,
+        _rows("verifying", ("verify", "HEADER", "rows")),
         (3_600_000, "--ticks", "Of each log."),
         ("kapitza", "dc_motor", "furuta", "battery_2rc"),
     ),
     Table(
         "compare-methods",
         "Weak form, strong form, output error and pysindy's weak form (needs pysindy).",
-        _of_methods,
+        _rows("methods", ("compare-methods", "HEADER", "rows")),
         (3, "--seeds", "Runs of each case."),
     ),
-    Table("strong-mechanisms", "The strong form on boards: its bits and the cost of a tick.", _of_strong, _ONCE),
-    Table("strong-fixed", "The same of the strong form in fixed point.", _of_strong_fixed, _ONCE),
-    Table("float-cost", "Where instructions and bytes of float32 go on a Cortex-M4F (needs QEMU).", _of_float, _ONCE),
-    Table("fixed-cost", "Where instructions and bytes of fixed point go (needs QEMU).", _of_fixed, _ONCE),
+    Table(
+        "strong-mechanisms",
+        "The strong form on boards: its bits and the cost of a tick.",
+        _rows("strong_mechanisms", ("strong-mechanisms", "HEADER", "rows")),
+        _ONCE,
+    ),
+    Table(
+        "strong-fixed",
+        "The same of the strong form in fixed point.",
+        _rows("strong_mechanisms", ("strong-fixed", "FIXED_HEADER", "fixed_rows")),
+        _ONCE,
+    ),
 )
 
 
@@ -218,8 +196,8 @@ def _add_table(one: Table) -> None:
     @bench.command(name=one.name, help=one.about)
     @click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
     @click.option(option, "number", default=default, show_default=True, type=click.IntRange(min=1), help=about)
-    @UPDATE
-    def command(chosen: tuple[str, ...], number: int, update: Path | None) -> int:
+    @DATA
+    def command(chosen: tuple[str, ...], number: int, data: Path | None) -> int:
         from pvid.models.mechanisms import names
 
         if unknown := set(chosen) - set(names()):
@@ -231,7 +209,7 @@ def _add_table(one: Table) -> None:
             tables = [(marker, header, list(rows)) for marker, header, rows in made]
         for marker, header, rows in tables:
             if rows:
-                put_table(update, marker, markdown(header, rows))
+                put_results(data, marker, header, rows)
         return DONE
 
 
@@ -244,15 +222,15 @@ for _table in TABLES:
 
 @bench.command(name="cycles")
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
-@UPDATE
-def bench_cycles(processes: int, update: Path | None) -> int:
+@DATA
+def bench_cycles(processes: int, data: Path | None) -> int:
     """Clock cycles of a tick on a real core, CV32E40P, simulated from its RTL by verilator with ideal memory."""
     from bench import cycles
 
     with progress_bar("images", cycles.STEPS) as advance:
         done = iter(range(1, cycles.STEPS + 1))
         rows = list(cycles.cycle_rows(processes, lambda: advance(next(done))))
-    put_table(update, "cycles", markdown(cycles.HEADER, rows))
+    put_results(data, "cycles", cycles.HEADER, rows)
     return DIFFERENT if any(row[-1] != "equal" for row in rows) else DONE
 
 
@@ -262,8 +240,8 @@ def bench_cycles(processes: int, update: Path | None) -> int:
     "--campaign", "count", default=0, type=click.IntRange(min=0), help="A random sample of all effects alone."
 )
 @click.option("--seed", default=1, show_default=True, help="Of the sample.")
-@UPDATE
-def bench_missing(clean: int, count: int, seed: int, update: Path | None) -> int:
+@DATA
+def bench_missing(clean: int, count: int, seed: int, data: Path | None) -> int:
     """Models that lack something: what is warned of, what is named, and what the standard errors contain."""
     from bench import lacking
 
@@ -273,22 +251,22 @@ def bench_missing(clean: int, count: int, seed: int, update: Path | None) -> int
             for case in lacking.campaign(count, seed):
                 found += [one for one in [lacking.told(case, seed)] if one is not None]
                 advance(case.number + 1)
-        put_table(update, "missing-campaign", markdown(lacking.CAMPAIGN, lacking.campaign_cells(found)))
+        put_results(data, f"missing-campaign-{seed}", lacking.CAMPAIGN, lacking.campaign_cells(found))
         return DONE
     rows = []
     with progress_bar("missing", lacking.ROWS) as advance:
         for done, row in enumerate(lacking.outcomes(clean), 1):
             rows.append(row)
             advance(done)
-    put_table(update, "missing", markdown(lacking.HEADER, [row.cells() for row in rows]))
-    put_table(update, "missing-sum", lacking.summary(rows))
+    put_results(data, "missing", lacking.HEADER, [row.cells() for row in rows])
+    put_counts(data, "missing-sum", lacking.summary(rows))
     return DONE
 
 
 @bench.command(name="cell")
 @click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@UPDATE
-def bench_cell(folder: Path | None, update: Path | None) -> int:
+@DATA
+def bench_cell(folder: Path | None, data: Path | None) -> int:
     """RC models on a cell that is no RC circuit; --write makes its records (needs PyBaMM)."""
     from bench import cell
 
@@ -296,19 +274,19 @@ def bench_cell(folder: Path | None, update: Path | None) -> int:
         for path in cell.write(folder):
             write_stderr(f"{path} written")
         return DONE
-    put_table(update, "cell", markdown(cell.HEADER, [one.cells() for one in cell.outcomes()]))
+    put_results(data, "cell", cell.HEADER, [one.cells() for one in cell.outcomes()])
     return DONE
 
 
 @bench.command(name="build-choices")
-@UPDATE
-def bench_build_choices(update: Path | None) -> int:
+@DATA
+def bench_build_choices(data: Path | None) -> int:
     """What each choice of a build of the weak form takes and gives, on the pendulum's shipped rig."""
     from bench import build_choices
 
     with progress_bar("builds", len(build_choices.CHOICES)) as advance:
         rows = list(build_choices.rows_of(progress=advance))
-    put_table(update, "build-choices", markdown(build_choices.HEADER, rows))
+    put_results(data, "build-choices", build_choices.HEADER, rows)
     return DONE
 
 
@@ -320,19 +298,36 @@ def bench_build_choices(update: Path | None) -> int:
     multiple=True,
     help="May be given again; by default one board of each instruction set.",
 )
-@UPDATE
-def bench_model_boards(boards: tuple[str, ...], update: Path | None) -> int:
+@DATA
+def bench_model_boards(boards: tuple[str, ...], data: Path | None) -> int:
     """The weak form of every mechanism on emulated boards, in both cores: its bits and the cost of a tick."""
     from bench import model_boards
 
     names = boards or model_boards.USUAL
     with progress_bar("boards", len(model_boards.rows(names))) as advance:
         rows = list(model_boards.rows_of(names, advance))
-    put_table(update, "model-boards", markdown(model_boards.HEADER, rows))
+    put_results(data, "model-boards", model_boards.HEADER, rows)
     return DIFFERENT if any(row[-1] == "DIFFERENT" for row in rows) else DONE
 
 
-def _put_rigs(rigs: Sequence[Rig], update: Path | None, prefix: str = "") -> None:
+def _verdict(faults: Sequence[str]) -> int:
+    """The exit code, with a line for each fault."""
+    for fault in faults:
+        write_stderr(f"pvid: {fault}")
+    return DIFFERENT if faults else DONE
+
+
+def _cut(sources: Sequence[Source], origin: Path, folder: Path) -> int:
+    """Writes the pieces of recordings."""
+    from bench import recordings
+
+    for source in sources:
+        for path in recordings.write_source(source, origin, folder):
+            write_stderr(f"{path} written")
+    return DONE
+
+
+def _put_rigs(rigs: Sequence[Rig], data: Path | None, prefix: str = "") -> None:
     """The tables of recorded rigs."""
     from bench import recorded_rigs
 
@@ -341,13 +336,13 @@ def _put_rigs(rigs: Sequence[Rig], update: Path | None, prefix: str = "") -> Non
         ("predictions", recorded_rigs.PREDICTIONS, recorded_rigs.prediction_rows),
         ("verdicts", recorded_rigs.VERDICTS, recorded_rigs.verdict_rows),
     ):
-        put_table(update, prefix + name, markdown(header, [row for rig in rigs for row in rows_of(rig)]))
+        put_results(data, prefix + name, header, [row for rig in rigs for row in rows_of(rig)])
 
 
 @bench.command(name="kept-recordings")
 @click.option("--cut", "archives", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@UPDATE
-def bench_kept_recordings(archives: Path | None, update: Path | None) -> int:
+@DATA
+def bench_kept_recordings(archives: Path | None, data: Path | None) -> int:
     """Likewise, the real rigs whose recordings are in tests/data/recordings.
 
     --cut writes the pieces anew from the unpacked archives ARCHIVES/NAME-VERSION of the packages that hold them.
@@ -355,23 +350,18 @@ def bench_kept_recordings(archives: Path | None, update: Path | None) -> int:
     from bench import kept_recordings, recorded_rigs, recordings
 
     if archives is not None:
-        for source in kept_recordings.KEPT:
-            for path in recordings.write_source(source, archives, recordings.MECHANISMS):
-                write_stderr(f"{path} written")
-        return DONE
+        return _cut(kept_recordings.KEPT, archives, recordings.MECHANISMS)
     rigs = list(recorded_rigs.rigs(recordings.MECHANISMS, kept_recordings.KEPT))
-    _put_rigs(rigs, update, "kept-")
+    _put_rigs(rigs, data, "kept-")
     faults = [fault for rig in rigs for fault in recorded_rigs.missed(rig)]
-    for fault in faults:
-        write_stderr(f"pvid: {fault}")
-    return DIFFERENT if faults else DONE
+    return _verdict(faults)
 
 
 @bench.command(name="recordings")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.option("--cut", "checkouts", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@UPDATE
-def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) -> int:
+@DATA
+def bench_recordings(folder: Path, checkouts: Path | None, data: Path | None) -> int:
     """Real rigs that others recorded: identified from one run, another one predicted, beside the published values.
 
     FOLDER holds the pieces; --cut writes them there from checkouts of the repositories that hold the recordings.
@@ -379,91 +369,96 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
     from bench import recorded_rigs, recordings
 
     if checkouts is not None:
-        for source in recordings.SOURCES:
-            for path in recordings.write_source(source, checkouts, folder):
-                write_stderr(f"{path} written")
-        return DONE
+        return _cut(recordings.SOURCES, checkouts, folder)
     rigs = list(recorded_rigs.rigs(folder))
-    _put_rigs(rigs, update)
+    _put_rigs(rigs, data)
     traps = [row for rig in rigs for row in recorded_rigs.trap_rows(rig.source, folder)]
-    put_table(update, "traps", markdown(recorded_rigs.TRAPS, traps))
+    put_results(data, "traps", recorded_rigs.TRAPS, traps)
     faults = [fault for rig in rigs for fault in recorded_rigs.missed(rig)]
     faults += [
         f"{row[0]}: the run {row[1]} does not raise its alarm" for row in traps if row[1] not in row[2].split(", ")
     ]
-    for fault in faults:
-        write_stderr(f"pvid: {fault}")
-    return DIFFERENT if faults else DONE
+    return _verdict(faults)
 
 
 @bench.command(name="reading")
-@UPDATE
-def bench_reading(update: Path | None) -> int:
+@DATA
+def bench_reading(data: Path | None) -> int:
     """Processor time and memory of reading runs of ten minutes at 1 kHz and of 10^7 samples."""
     from bench import reading
 
-    put_table(update, "reading", markdown(reading.HEADER, list(reading.reading_table())))
+    put_results(data, "reading", reading.HEADER, list(reading.reading_table()))
     return DONE
 
 
 @bench.command(name="fuzz-link")
 @click.option("--runs", default=10_000_000, show_default=True, type=click.IntRange(min=1))
-def bench_fuzz_link(runs: int) -> int:
+@DATA
+def bench_fuzz_link(runs: int, data: Path | None) -> int:
     """The C side of the serial link under libFuzzer, with sanitizers (needs clang)."""
     from bench.fuzz import fuzz_link
 
     folder = Path(tempfile.mkdtemp(prefix="pvid-fuzz-"))
-    click.echo(f"{fuzz_link(folder, runs)} inputs, none broke the codec")
+    put_counts(data, "fuzz-link", (("inputs", fuzz_link(folder, runs)), ("failures", 0)))
     return DONE
 
 
 @bench.command(name="fuzz-api")
 @click.option("--calls", default=10_000_000, show_default=True)
 @click.option("--seed", default=1, show_default=True)
-def bench_fuzz_api(calls: int, seed: int) -> int:
+@DATA
+def bench_fuzz_api(calls: int, seed: int, data: Path | None) -> int:
     """Random calls of the C core's public API, with sanitizers (needs clang)."""
     from bench.fuzz import fuzz_api
 
     with tempfile.TemporaryDirectory(prefix="pvid-fuzz-") as folder:
-        click.echo(fuzz_api(Path(folder), calls, seed).text)
+        put_counts(data, "fuzz-api", fuzz_api(Path(folder), calls, seed).counts)
     return DONE
 
 
 @bench.command(name="codec")
 @click.option("--frames", default=1_000_000, show_default=True, type=click.IntRange(min=1))
-def bench_codec(frames: int) -> int:
+@DATA
+def bench_codec(frames: int, data: Path | None) -> int:
     """Corrupted frames of every length against both decoders of the serial link."""
     from bench.codec import corrupt
 
     with progress_bar("corrupted frames", frames) as advance:
         tally = corrupt(frames, Native(), progress=advance)
-    click.echo(
-        f"{tally.frames} corrupted frames, C and Python alike: {tally.wrong} let through wrong; of the good frames "
-        f"behind them the first was lost {tally.lost_first} times, the second {tally.lost_second} times"
+    counts = (
+        ("corrupted frames", tally.frames),
+        ("accepted with wrong content", tally.wrong),
+        ("first good frame behind lost", tally.lost_first),
+        ("second good frame behind lost", tally.lost_second),
     )
+    put_counts(data, "codec", counts)
     return DIFFERENT if tally.wrong or tally.lost_second else DONE
 
 
 @bench.command(name="log")
 @click.option("--frames", default=200_000, show_default=True, type=click.IntRange(min=1000))
-def bench_log(frames: int) -> int:
+@DATA
+def bench_log(frames: int, data: Path | None) -> int:
     """Frames a minute of processor time through `pvid log`, losses, memory."""
     from bench.field import throughput
 
     seen = throughput(frames)
-    click.echo(
-        f"{seen.frames} of {frames} frames, {seen.lost} lost; {seen.cpu_s:.1f} s of processor time, "
-        f"{60 * seen.frames / seen.cpu_s:.0f} frames a minute of it; resident memory {seen.early_kb} kB after a "
-        f"quarter, {seen.late_kb} kB at the end"
+    counts = (
+        ("frames of 16 samples", seen.frames),
+        ("lost", seen.lost),
+        ("frames in a minute of processor time", round(60 * seen.frames / seen.cpu_s)),
+        ("resident memory after a quarter, kB", seen.early_kb),
+        ("at the end, kB", seen.late_kb),
     )
+    put_counts(data, "log", counts)
     return DONE if seen.frames == frames and not seen.lost else DIFFERENT
 
 
 @bench.command(name="liar")
-@UPDATE
+@DATA
 @click.option("--mutants", default=100_000, show_default=True, help="Frames changed at random.")
 @click.option("--only", metavar="BEHAVIOUR", multiple=True, help="A behaviour named in the table; repeatable.")
-def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
+def bench_liar(data: Path | None, mutants: int, only: tuple[str, ...]) -> int:
     """A board that sends false data, against `pvid log` and all readers of its logs; then mutants of frames."""
     from bench import liar
     from bench.liar_mutants import mutate
@@ -485,15 +480,15 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
     for fault in tally.faults:
         click.echo(fault, err=True)
     faults = sum(len(one.faults) for one in performances)
-    put_table(update, "liar", markdown(liar.HEADER, [one.cells() for one in performances]))
-    runs = sum(len(one.codes) for one in performances)
-    summary = (
-        f"{len(performances)} behaviours, {runs} runs of a command: {faults} defects, at most "
-        f"{max((one.peak_kb for one in performances), default=0) / 1024:.0f} MB of memory, at most "
-        f"{max((one.late_s for one in performances), default=0):.1f} s late. {tally.mutants} mutants in {tally.logs} "
-        f"logs: {len(tally.faults)} defects."
+    counts = (
+        ("behaviours", len(performances)),
+        ("runs of a command", sum(len(one.codes) for one in performances)),
+        ("mutants of frames", tally.mutants),
+        ("defects", faults + len(tally.faults)),
+        ("largest memory of the logger, kB", max(one.peak_kb for one in performances)),
+        ("latest end of the logger, ms", round(1000 * max(one.late_s for one in performances))),
     )
-    put_table(update, "liar-summary", summary)
+    put_counts(data, "liar", counts)
     return DIFFERENT if faults or tally.faults else DONE
 
 
@@ -508,7 +503,7 @@ def bench_liar(update: Path | None, mutants: int, only: tuple[str, ...]) -> int:
     type=click.Path(path_type=Path, dir_okay=False),
     help="File of finished chunks: a run that was stopped continues behind them.",
 )
-@UPDATE
+@DATA
 def bench_attack(
     mutants: int,
     seed: int,
@@ -516,7 +511,7 @@ def bench_attack(
     processes: int,
     keep: Path | None,
     done: Path | None,
-    update: Path | None,
+    data: Path | None,
 ) -> int:
     """Runs mutated rig files, runs and command lines, and counts defects."""
     from bench.attack import HEADER, KINDS, campaign
@@ -527,7 +522,7 @@ def bench_attack(
     for tally in tallies:
         for arguments, wrong, number in tally.defects:
             write_stderr(f"{tally.kind}, mutant {number}: {' '.join(arguments)}: {wrong}")
-    put_table(update, "attack", markdown(HEADER, [tally.cells for tally in tallies]))
+    put_results(data, "attack", HEADER, [tally.cells for tally in tallies])
     return DIFFERENT if any(tally.defects for tally in tallies) else DONE
 
 
@@ -537,7 +532,8 @@ def bench_attack(
     "--samples", default=3_600_000, show_default=True, type=click.IntRange(min=10_000), help="An hour at 1 kHz."
 )
 @click.option("--out", type=click.Path(path_type=Path), default=Path("field-log.pvlog"), show_default=True)
-def bench_field_log(target: str, samples: int, out: Path) -> int:
+@DATA
+def bench_field_log(target: str, samples: int, out: Path, data: Path | None) -> int:
     """An hour in the field, shortened in time: the board killed twice, its line closed once, every segment verified."""
     from bench.field import field_log
     from pvid.log.verify import Verdict
@@ -550,6 +546,14 @@ def bench_field_log(target: str, samples: int, out: Path) -> int:
         verdict.add(stretch)
     click.echo(verdict.text)
     click.echo(account.text)
+    counts = (
+        ("samples recorded", account.samples),
+        ("missing between them", account.missing_samples),
+        ("taken while the line was closed", account.unheard),
+        ("estimates and hashes compared", verdict.checked),
+        ("different", verdict.different),
+    )
+    put_counts(data, "field-log", counts)
     whole = len(verdict.good) == len(account.segments) and not verdict.different and not account.missing_samples
     return DONE if whole else DIFFERENT
 
@@ -559,7 +563,8 @@ def bench_field_log(target: str, samples: int, out: Path) -> int:
 @click.option("--core", default="f32", show_default=True, type=click.Choice(["f32", "q31"]))
 @click.option("--samples", default=20_000, show_default=True, help="At each passage.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("year.pvlog"), show_default=True)
-def bench_year(target: str, core: Core, samples: int, out: Path) -> int:
+@DATA
+def bench_year(target: str, core: Core, samples: int, out: Path, data: Path | None) -> int:
     """A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page."""
     from bench.year import emulated_year, passages_of_a_year
     from pvid.rig.mechanism_file import MechanismRig
@@ -570,31 +575,37 @@ def bench_year(target: str, core: Core, samples: int, out: Path) -> int:
     passages = tuple(range(1, 1 + passages_of_a_year(1000.0)))
     with progress_bar("verifying", None) as advance:
         year = emulated_year(target, passages, samples, out, rig, core, advance)
-    click.echo(f"{year.passages} passages of 2^32 ticks; {year.verdict.text}")
+    click.echo(year.verdict.text)
     click.echo(year.account.text)
     for sentence in year.faults:
         click.echo(f"pvid: {sentence}", err=True)
+    counts = (
+        ("passages of 2^32 ticks", year.passages),
+        ("samples verified", year.verdict.verified),
+        ("faults", len(year.faults)),
+    )
+    put_counts(data, f"year-{core}", counts)
     return DIFFERENT if year.faults or not year.verdict.verified else DONE
 
 
 @bench.command(name="long")
-@UPDATE
+@DATA
 @click.option("--only", metavar="ROOM", multiple=True, help="A folder of tests/; repeatable.")
-def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
+def bench_long(data: Path | None, only: tuple[str, ...]) -> int:
     """The long forms of the tests: 40 000 ticks, every build and board, mutants (an hour)."""
     from bench import long
 
     rows = long.long_table(only)
-    put_table(update, "long", markdown(long.HEADER, rows))
+    put_results(data, "long", long.HEADER, rows)
     return DONE if all(row[-1] == "passed" for row in rows) else DIFFERENT
 
 
 @bench.command(name="random-models")
-@UPDATE
+@DATA
 @click.option("--count", default=2000, show_default=True, type=click.IntRange(min=1), help="Of rigs.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the first rig.")
 @click.option("--resume", is_flag=True, help="Go on behind the rigs of an earlier run of this seed on this code.")
-def bench_random_models(update: Path | None, count: int, seed: int, resume: bool) -> int:
+def bench_random_models(data: Path | None, count: int, seed: int, resume: bool) -> int:
     """Random rigs the whole road: check, identify in float64 and in C, refine, build, compile, equal bits; and
     descriptions without sense, of which each is a report or one sentence."""
     from bench import random_models, senseless_models
@@ -604,12 +615,10 @@ def bench_random_models(update: Path | None, count: int, seed: int, resume: bool
         kept.unlink(missing_ok=True)
     with progress_bar("rigs", count) as advance:
         found = random_models.roads(range(seed, seed + count), kept, advance)
-    put_table(update, "random-models", markdown(random_models.HEADER, random_models.table_of(found)))
-    put_table(update, "compile-times", markdown(random_models.COMPILE_HEADER, random_models.compile_times()))
+    put_results(data, "random-models", random_models.HEADER, random_models.table_of(found))
+    put_results(data, "compile-times", random_models.COMPILE_HEADER, random_models.compile_times())
     senseless = senseless_models.run(range(seed, seed + 2 * count))
-    put_table(update, "senseless-models", markdown(senseless_models.HEADER, [senseless.row()]))
+    put_results(data, "senseless-models", senseless_models.HEADER, [senseless.row()])
     failures = [f"rig {one.seed} ({one.kind}): {failure}" for one in found for failure in one.failures]
     failures += [f"description {number}: {error}" for number, error in senseless.tracebacks]
-    for failure in failures:
-        write_stderr(f"pvid: {failure}")
-    return DIFFERENT if failures else DONE
+    return _verdict(failures)

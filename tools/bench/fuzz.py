@@ -46,12 +46,16 @@ class ApiCalls:
     published: int  # of those
 
     @property
-    def text(self) -> str:
-        """In one sentence."""
+    def counts(self) -> tuple[tuple[str, int], ...]:
+        """What was tried and seen, by name."""
         return (
-            f"{self.calls} calls of step after {self.inits} inits ({self.accepted} accepted) and {self.snapshots} "
-            f"restores ({self.restored} accepted): 0 failures; {self.sound} runs of garbage under sound settings, "
-            f"{self.published} published"
+            ("calls of step", self.calls),
+            ("calls of init", self.inits),
+            ("of these accepted", self.accepted),
+            ("restores of a snapshot", self.snapshots),
+            ("restores accepted", self.restored),
+            ("runs of garbage with valid settings", self.sound),
+            ("of these with an estimate published", self.published),
         )
 
 

@@ -623,12 +623,12 @@ def outcomes(clean: int) -> Iterator[Row]:
             yield Row(name, effect, tuple(outcome(plant, seed, (effect, size)) for seed, size in sizes))
 
 
-def summary(rows: Sequence[Row]) -> str:
-    """In sentences."""
+def summary(rows: Sequence[Row]) -> tuple[tuple[str, int], ...]:
+    """Counts over all rows, by name."""
     clean = [row for row in rows if row.effect is None]
     spoilt = [row for row in rows if row.effect is not None]
     every = [one for row in spoilt for one in row.done]
-    visible = [np.max(one.off / np.abs(one.found.p)) > WRONG for one in every]
+    visible = [bool(np.max(one.off / np.abs(one.found.p)) > WRONG) for one in every]
     right = [ok for row in spoilt for ok in row.right]
     covered = np.concatenate([one.off <= 2 * one.found.se for row in rows for one in row.done])
     without = sum(
@@ -638,13 +638,15 @@ def summary(rows: Sequence[Row]) -> str:
     )
     silent, seen, named = (sum(row.wrong for row in spoilt), sum(visible), list(zip(right, visible, strict=True)))
     return (
-        f"Of {len(every)} recordings with an effect {silent} are wrong without a warning: some parameter off by more "
-        f"than 4 of its standard errors and 2 %. Without the model's part of the errors {without} would be that far "
-        f"off. Of {seen} with a parameter more than 2 % off the first named term is right in "
-        f"{sum(ok and large for ok, large in named)}; wrongly named are {sum(row.named_wrongly for row in spoilt)} of "
-        f"all. Of {sum(len(row.done) for row in clean)} recordings without an effect "
-        f"{sum(row.warnings for row in clean)} have a warning. Two standard errors cover "
-        f"{100 * float(np.mean(covered)):.0f} % of all parameters."
+        ("recordings with an effect", len(every)),
+        ("wrong without a warning: more than 4 s.e. and 2 % off", silent),
+        ("as far off without the model's part of the errors", without),
+        ("with a parameter more than 2 % off", seen),
+        ("of these the first named term is right", sum(ok and large for ok, large in named)),
+        ("wrongly named, of all", sum(row.named_wrongly for row in spoilt)),
+        ("recordings without an effect", sum(len(row.done) for row in clean)),
+        ("of these with a warning", sum(row.warnings for row in clean)),
+        ("parameters within two s.e., %", round(100 * float(np.mean(covered)))),
     )
 
 

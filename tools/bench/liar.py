@@ -188,48 +188,15 @@ def _unreadable(behaviour: Behaviour, log: Path) -> list[str]:
 @dataclass
 class Performance:
     """What a behaviour did to the program: exit codes by command, peak of the logger's resident memory [kB], how long
-    it lasted beyond its duration [s], bytes of the log, and what went wrong."""
+    it lasted beyond its duration [s], and what went wrong."""
 
     behaviour: Behaviour
     codes: dict[str, int | None] = field(default_factory=dict)
     peak_kb: int = 0
     late_s: float = 0.0
-    log_bytes: int = 0
     faults: list[str] = field(default_factory=list)
 
-    def cells(self) -> tuple[str, ...]:
-        """A row of the table."""
 
-        def code(*commands: str) -> str:
-            found = {self.codes.get(one) for one in commands}
-            return ", ".join("-" if one is None else str(one) for one in sorted(found, key=str))
-
-        return (
-            self.behaviour.name,
-            code("log"),
-            code("verify"),
-            code(*(f"export {form}" for form in EXPORTS)),
-            code("identify"),
-            code("plot"),
-            f"{self.log_bytes / 1e6:.2f}",
-            f"{self.peak_kb / 1024:.0f}",
-            f"{self.late_s:.1f}",
-            str(len(self.faults)),
-        )
-
-
-HEADER = (
-    "what the board does",
-    "log",
-    "verify",
-    "exports",
-    "identify",
-    "plot",
-    "log, MB",
-    "peak memory, MB",
-    "late, s",
-    "defects",
-)
 DURATION_S = 3.0
 MOST_KB = 150 * 1024
 LATEST_S = 8.0
@@ -280,14 +247,13 @@ def perform(behaviour: Behaviour, folder: Path) -> Performance:
         out.seek(0)
         _note(done, "log", process.returncode, out.read())
     server.close()
-    done.log_bytes = log.stat().st_size if log.exists() else 0
     if done.codes["log"] not in behaviour.log:
         done.faults.append(f"log: exit code {done.codes['log']} in place of {behaviour.log[-1]}")
     if done.peak_kb > MOST_KB:
         done.faults.append(f"log: {done.peak_kb} kB of memory")
     if done.late_s > LATEST_S:
         done.faults.append(f"log: ends {done.late_s:.0f} s late")
-    if done.log_bytes <= _READ_WHOLE:
+    if not log.exists() or log.stat().st_size <= _READ_WHOLE:
         for one in COMMANDS:
             done.codes[one], faults = _invoked(one, log, folder)
             done.faults += faults

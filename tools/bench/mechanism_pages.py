@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,9 +13,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from bench.figures import results_of
 from pvid.base.atomic_write import write_whole
 from pvid.base.figure_file import save
 from pvid.base.replacing import replacing
+from pvid.cli.page_table import markdown
+from pvid.cli.results import Results
 from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
 from pvid.models.mechanisms import compiled_of, path_of
@@ -27,11 +28,13 @@ from pvid.oracle.weak.identify import identify
 from pvid.sim.simulated_run import RigSimulation
 
 SEED = 1
-# Tables of benchmarks/mechanisms.md and their headings on a mechanism's own page.
-TABLES = {
-    "mechanisms": "Errors with soft friction, the rig's own design",
-    "mechanisms-chosen": "Errors with sharp friction, a design chosen on each run",
-}
+ERRORS = "mechanisms-chosen"  # the table of results on a mechanism's page
+_ERRORS_HEAD = """
+## Errors of 20 runs
+
+A design chosen on each run, friction sharp, float64 (`./tools/pvid bench mechanisms`).
+
+"""
 _SHOWN = 0.25  # of the run, in the picture
 
 
@@ -96,21 +99,18 @@ def fit_of(example: Example, name: str) -> float:
     return 1.0 - float(np.sum((measured - simulated) ** 2) / np.sum((measured - measured.mean()) ** 2))
 
 
-def errors_of(table: str, page_text: str, name: str) -> list[str]:
-    """Lines of a table of benchmarks/mechanisms.md with the rows of one mechanism, without its column; none: []."""
-    found = re.search(rf"<!-- {table} -->\n(.*?)<!-- /{table} -->", page_text, re.S)
-    lines = found[1].strip().splitlines() if found else []
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    rows = [row for row in cells[2:] if row[0] == name]
-    return [f"| {' | '.join(row[1:])} |" for row in [*cells[:2], *rows]] if rows else []
+def errors_of(results: Results, name: str) -> str:
+    """The rows of one mechanism, in Markdown, without its column; "": it has none."""
+    rows = [row[1:] for row in results.rows if row[0] == name]
+    return markdown(results.header[1:], rows) if rows else ""
 
 
-def page(name: str, example: Example, errors: Mapping[str, str]) -> str:
+def page(name: str, example: Example, errors: str) -> str:
     """The text of a page.
 
     Parameters
     ----------
-    errors : heading -> table
+    errors : a table
     """
     model, (_, path) = example.model, path_of(name)
     sensors = [one for one in model.signals if one.kind == "sensor" and not one.driven]
@@ -119,7 +119,7 @@ def page(name: str, example: Example, errors: Mapping[str, str]) -> str:
         [
             f"# {model.title}",
             "",
-            "Written by `./tools/pvid bench pages`: do not edit. [All mechanisms](../benchmarks/mechanisms.md), "
+            "Written by `./tools/pvid bench pages`: do not edit. [Accuracy](../benchmarks.md), "
             "[how to describe your own](../models.md).",
             "",
             "```python",
@@ -136,7 +136,7 @@ def page(name: str, example: Example, errors: Mapping[str, str]) -> str:
             f"from the same start and drive; R^2 over the whole run: {fits}.",
             "",
             f"![Measured and simulated signals](../images/mechanisms/{name}.png)",
-            *(f"\n## {heading}\n\n{table}" for heading, table in errors.items()),
+            *([_ERRORS_HEAD + errors] if errors else []),
             "",
         ]
     )
@@ -165,7 +165,5 @@ def write_page(docs: Path, name: str) -> None:
     example = example_of(name)
     with replacing():  # pictures of any version
         picture(example, docs / "images" / "mechanisms" / f"{name}.png")
-    measured = (docs / "benchmarks" / "mechanisms.md").read_text(encoding="utf-8")
-    tables = {heading: errors_of(table, measured, name) for table, heading in TABLES.items()}
-    errors = {heading: "\n".join(lines) for heading, lines in tables.items() if lines}
+    errors = errors_of(results_of(ERRORS), name)
     write_whole(docs / "mechanisms" / f"{name}.md", page(name, example, errors), freely=True)

@@ -180,7 +180,7 @@ def refined_rows(names: tuple[str, ...], seeds: int, progress: Callable[[], obje
     return rows
 
 
-def friction_rows(names: tuple[str, ...], seeds: int) -> list[tuple[str, ...]]:
-    """Rows of IMPERFECT."""
+def friction_rows(names: tuple[str, ...], seeds: int, _: Callable[[], object]) -> list[tuple[str, ...]]:
+    """Rows of IMPERFECT, of half as many seeds."""
     given = [(name, case) for name, _, case in cases(names) if name in FRICTION]
-    return [row for name, case in given for row in imperfect_rows(name, case, seeds)]
+    return [row for name, case in given for row in imperfect_rows(name, case, seeds // 2)]

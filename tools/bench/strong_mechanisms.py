@@ -135,10 +135,19 @@ static const int replay_config = 1000000;
 """
 
 
-def rows_of(
-    names: Sequence[str], progress: Callable[[], object], row: Callable[[str], tuple[str, ...]] = row_of
+def rows(names: Sequence[str], _: int, progress: Callable[[], object]) -> Iterator[tuple[str, ...]]:
+    """Of HEADER."""
+    return _each(row_of, names, progress)
+
+
+def fixed_rows(names: Sequence[str], _: int, progress: Callable[[], object]) -> Iterator[tuple[str, ...]]:
+    """Of FIXED_HEADER."""
+    return _each(fixed_row_of, names, progress)
+
+
+def _each(
+    row: Callable[[str], tuple[str, ...]], names: Sequence[str], progress: Callable[[], object]
 ) -> Iterator[tuple[str, ...]]:
-    """All rows of a table."""
     for name in names:
         yield row(name)
         progress()

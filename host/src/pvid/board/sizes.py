@@ -246,7 +246,7 @@ def figures_of(found: Footprint) -> dict[str, int]:
 
 
 def table_rows(footprints: dict[Configuration, Footprint]) -> list[tuple[str, ...]]:
-    """Cells of the table in host/docs/benchmarks/cost.md, as in HEADER."""
+    """Cells of the table `sizes`, as in HEADER."""
     return [
         (
             f"{configuration.board.core} ({configuration.board.name})",

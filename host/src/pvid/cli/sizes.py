@@ -9,13 +9,15 @@ import click
 
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.page_table import UPDATE, markdown, put_table, table_in
+from pvid.cli.page_table import UPDATE, put_table, table_in
+from pvid.cli.results import DATA, put_results
 from pvid.settings.enums import Core
 from pvid.settings.forms import FORMS
 
 
 @click.command(name="sizes")
 @UPDATE
+@DATA
 @click.option(
     "--budget", type=click.Path(path_type=Path, exists=True), help="Write the measured figures to this budget file."
 )
@@ -29,6 +31,7 @@ from pvid.settings.forms import FORMS
 @click.option("--profile", "profiled", metavar="BOARD", help="Count the instructions of a tick on BOARD by function.")
 def command(
     update: Path | None,
+    data: Path | None,
     budget: Path | None,
     check: Path | None,
     profiled: str | None,
@@ -56,16 +59,19 @@ def command(
             **{form: profile.profile(on, form) for form in FORMS},
             sizes.REFINED: profile.refined(on),
         }
-        put_table(update, "profile", markdown(profile.HEADER, profile.table_rows(profiles)))
+        put_results(data, "profile", profile.HEADER, profile.table_rows(profiles))
         return DONE
-    if (targets or models) and (update is not None or budget is not None or check is not None):
+    whole = [one for one in (budget, check) if one is not None]
+    if (targets or models) and (update is not None or whole):
         raise PvidError("--update, --budget and --check measure every board: name no TARGET and no --model")
     named = [boards.board(name) for name in targets] or list(boards.BOARDS.values())
     summary = None if update is None else table_in(update, sizes.SUMMARY)
+    if update is not None and summary is None:
+        raise PvidError(f"{update} has no table {sizes.SUMMARY}")
     chosen = sizes.configurations_on(named, models, core or "f32")
     if summary is not None:
-        if budget is not None or check is not None:
-            raise PvidError(f"{update} names some boards; --budget and --check measure every board")
+        if whole or data is not None:
+            raise PvidError(f"{update} names some boards; --data, --budget and --check measure every board")
         chosen = sizes.named_in(summary)
     footprints = {}
     with progress_bar("boards", len(chosen)) as advance:
@@ -78,7 +84,7 @@ def command(
     if summary is not None:
         put_table(update, sizes.SUMMARY, sizes.with_costs(summary, footprints))
         return DONE
-    put_table(update, "sizes", markdown(sizes.HEADER, sizes.table_rows(footprints)))
+    put_results(data, "sizes-models" if models else "sizes", sizes.HEADER, sizes.table_rows(footprints))
     if budget is not None:
         sizes.write_budget(budget, footprints)
     excess = sizes.over_budget(check, footprints) if check is not None else []

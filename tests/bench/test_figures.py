@@ -1,0 +1,91 @@
+"""The page of benchmarks: sentences and pictures are those of the tables of results; a table names its command."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+from bench.command import TABLES as COMMANDS
+from bench.command import Table
+from bench.figures import DATA, IMAGES, PAGE, PARTS, Part, results_of
+from pvid.base.errors import PvidError
+from pvid.cli.page_table import table_in
+from pvid.cli.results import Results, put_counts, put_results, read_results
+
+sys.path.insert(0, str(ROOT / "tools"))
+
+import pages  # noqa: E402 - of tools
+
+TABLES = sorted(path.stem for path in DATA.glob("*.csv"))
+ANEW = "write it anew: ./tools/pvid bench figures"
+
+
+@pytest.mark.parametrize("part", PARTS, ids=lambda one: one.name)
+def test_sentences_and_picture_are_those_of_the_tables(part: Part) -> None:
+    assert table_in(PAGE, part.name) == "\n".join(part.sentences()), ANEW
+    shown = (IMAGES / f"{part.name}.png").read_bytes()
+    assert part.digest.encode() in shown, ANEW
+    assert len(shown) < 60_000
+    assert part.digest.encode() in part.picture()
+
+
+def test_a_changed_cell_changes_the_digest(monkeypatch: pytest.MonkeyPatch) -> None:
+    part = next(one for one in PARTS if one.name == "missing")
+    before = part.digest
+    kept = results_of(part.tables[0])
+    other = Results(kept.header, [*kept.rows[:-1], ("all", *["1"] * (len(kept.header) - 1))], kept.made)
+    monkeypatch.setattr("bench.figures.results_of", lambda name: other)
+    assert part.digest != before
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_names_the_command_the_commit_and_the_day_that_made_it(name: str) -> None:
+    made = results_of(name).made
+    assert list(made) == ["command", "commit", "date"]
+    assert re.fullmatch(r"[0-9a-f]{8,}\+?", made["commit"]) and re.fullmatch(r"20\d\d-\d\d-\d\d", made["date"])
+    pages.parse(made["command"].replace(" FOLDER", " tests"))
+
+
+def test_every_table_is_on_the_page_and_has_a_command_that_writes_it() -> None:
+    linked = re.findall(r"\]\(benchmarks/([\w-]+)\.csv\)", PAGE.read_text(encoding="utf-8"))
+    assert sorted(linked) == TABLES
+    sources = [*(ROOT / "tools" / "bench").glob("*.py"), ROOT / "host" / "src" / "pvid" / "cli" / "sizes.py"]
+    text = "".join(path.read_text(encoding="utf-8") for path in sources)
+    for name in TABLES:
+        stem = re.sub(r"^kept-|-(\d+|f32|q31)$", "", name)
+        assert f'"{stem}"' in text or f'f"{stem}-' in text, name
+
+
+@pytest.mark.parametrize("one", COMMANDS, ids=lambda one: one.name)
+def test_a_table_has_the_columns_that_its_command_writes(one: Table) -> None:
+    for marker, header, rows in one.make((), 1, lambda: None):
+        assert results_of(marker).header == header and list(rows) == []
+
+
+def test_the_page_is_short() -> None:
+    assert len(PAGE.read_text(encoding="utf-8").split()) <= 2500
+
+
+def test_what_was_written_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["pvid", "bench", "x", "--data", str(tmp_path), "--seeds", "3"])
+    put_results(tmp_path, "a", ("name", "R^2, %"), [("b, c", "1"), ('"d"', "")])
+    found = read_results(tmp_path / "a.csv")
+    assert (found.header, found.rows) == (("name", "R^2, %"), [("b, c", "1"), ('"d"', "")])
+    assert found.made["command"] == "./tools/pvid bench x --seeds 3"
+    assert found.column("R^2, %") == ["1", ""] and found.where(name="b, c") == [{"name": "b, c", "R^2, %": "1"}]
+
+
+def test_without_a_folder_a_table_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    put_counts(None, "a", (("runs", 3),))
+    assert capsys.readouterr().out == "| what | number |\n|---|---|\n| runs | 3 |\n"
+
+
+@pytest.mark.parametrize("text", ["", "# command: x\n", "a,b\n1\n"])
+def test_what_is_no_table_is_one_sentence(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(PvidError, match="is no table of results"):
+        read_results(tmp_path / "a.csv")

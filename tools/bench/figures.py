@@ -1,0 +1,479 @@
+"""The page host/docs/benchmarks.md: six figures, and sentences with figures, from the tables of results beside it."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import statistics
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pvid.base.atomic_write import write_whole
+from pvid.cli.page_table import with_table
+from pvid.cli.results import Results, read_results
+from pvid.core.sources import ROOT
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PAGE = ROOT / "host" / "docs" / "benchmarks.md"
+DATA = PAGE.with_suffix("")
+IMAGES = ROOT / "host" / "docs" / "images" / "benchmarks"
+WEAK, REFINED, BAD, OTHER = "C0", "C2", "C3", "0.6"
+_DPI = 80
+_TOO_FAR = 100.0  # a cell "> 100"
+
+
+def results_of(name: str) -> Results:
+    """A table of results of the documentation."""
+    return read_results(DATA / f"{name}.csv")
+
+
+def sums_of(name: str) -> dict[str, int]:
+    """Counts of one run, by name."""
+    return {what: int(number) for what, number in results_of(name).rows}
+
+
+def _number(cell: str) -> float:
+    return _TOO_FAR if cell.startswith(">") else float(cell.split()[0])
+
+
+def _numbers(cells: Sequence[str]) -> list[float]:
+    return [_number(cell) for cell in cells]
+
+
+def _names(rows: Sequence[str]) -> list[str]:
+    """Each once, in their order."""
+    return list(dict.fromkeys(rows))
+
+
+def _points(axis: Axes, table: Results, value: str, shift: float, colour: str, label: str) -> None:
+    """A column of dots for each mechanism."""
+    names = _names(table.column("mechanism"))
+    at = [names.index(name) + shift for name in table.column("mechanism")]
+    axis.plot(at, _numbers(table.column(value)), "o", color=colour, alpha=0.6, markersize=4, label=label)
+    axis.set_xticks(range(len(names)), names, rotation=20)
+
+
+# ---- accuracy
+
+
+def _at_1_khz(table: Results) -> Results:
+    """Without the mechanism that is measured at other rates too."""
+    return Results(table.header, [row for row in table.rows if row[1] in ("1000", "1")], table.made)
+
+
+def draw_accuracy(figure: Figure) -> None:
+    """Errors of every parameter beside the Cramer-Rao bound, of each stage."""
+    axis = figure.subplots()
+    refined = _at_1_khz(results_of("refine-mechanisms"))
+    _points(axis, refined, "weak: RMS / bound", -0.2, OTHER, "first stage in C (float32)")
+    _points(axis, results_of("mechanisms-chosen"), "RMS / bound", 0.0, WEAK, "first stage in float64")
+    _points(axis, refined, "refined: RMS / bound", 0.2, REFINED, "both stages in C (float32)")
+    axis.axhline(1.0, color="k", linewidth=0.8)
+    axis.set_yscale("log")
+    axis.set_ylabel("RMS error / Cramer-Rao bound")
+    axis.legend(fontsize="small", loc="upper left")
+
+
+def of_accuracy() -> list[str]:
+    """Sentences below the figure."""
+    lines = []
+    for name, value, title in (
+        ("mechanisms", "RMS / bound", "First stage, float64, soft friction"),
+        ("mechanisms-chosen", "RMS / bound", "First stage, float64, sharp friction"),
+        ("refine-mechanisms", "weak: RMS / bound", "First stage in C, sharp friction and large angles"),
+        ("refine-mechanisms", "refined: RMS / bound", "Both stages in C, the same runs"),
+    ):
+        table = results_of(name)
+        ratios = _numbers(table.column(value))
+        worst = table.rows[ratios.index(max(ratios))]
+        parameter = worst[table.header.index("parameter")]
+        lines.append(
+            f"- {title}: median {statistics.median(ratios):.2g} times the bound, largest {max(ratios):.3g} "
+            f"({parameter} of `{worst[0]}`)."
+        )
+    inside = [statistics.mean(_numbers(results_of(name).column("in 2 s.e. %"))) for name in _COVERED]
+    lines.append(
+        f"- Two standard errors contain the truth in {inside[0]:.0f} %, {inside[1]:.0f} % and {inside[2]:.0f} % of the "
+        "cases of the first, second and fourth line."
+    )
+    q31 = _numbers(results_of("weak-q31").column("ratio"))
+    lines.append(f"- Fixed point against float32: largest ratio of RMS errors {max(q31):.3f}.")
+    hard = results_of("hard")
+    silent = [row for row in hard.where() if int(row["wrong, no alarm"]) > 0]
+    listed = ", ".join(f"{one['wrong, no alarm']} of `{one['mechanism']}`, {one['case']}" for one in silent)
+    lines.append(
+        f"- Difficult cases in C, {len(hard.rows)} rows of 10 runs: {sum(map(int, hard.column('wrong, no alarm')))} "
+        f"runs off by more than 3 s.e. without an alarm ({listed}); chance gives "
+        f"{sum(float(cell) for cell in hard.column('by chance') if cell != '-'):.1f}."
+    )
+    gains = results_of("imperfections")
+    wrong = [row for row in gains.where() if not row["wrong without a warning"].startswith("0/")]
+    lines.append(
+        f"- Imperfect rigs: wrong without a warning in {len(wrong)} of {len(gains.rows)} rows: "
+        f'"{", ".join(_names([row["imperfection"] for row in wrong]))}".'
+    )
+    lacking = results_of("refine-friction")
+    lines.append(
+        f"- Both stages, imperfect rigs, {len(lacking.rows)} rows of 10 runs: "
+        f"{sum(map(int, lacking.column('beyond 5 s.e. and 1 %')))} estimates off by more than 5 s.e. and 1 %."
+    )
+    return lines
+
+
+_COVERED = ("mechanisms", "mechanisms-chosen", "refine-mechanisms")
+
+
+# ---- cost
+
+
+def draw_cost(figure: Figure) -> None:
+    """Instructions and bytes of every mechanism."""
+    boards, sizes = results_of("model-boards"), results_of("sizes-models")
+    left, right = figure.subplots(1, 2)
+    names = list(boards.header[2:-1])
+    for core, board, marker, colour, label in (
+        ("f32", "Cortex-M4F (mps2-an386)", "o", WEAK, "Cortex-M4F, float32"),
+        ("q31", "Cortex-M0 (microbit)", "s", REFINED, "Cortex-M0, fixed point"),
+        ("f32", "Cortex-M0 (microbit)", "^", BAD, "Cortex-M0, float32"),
+    ):
+        (row,) = boards.where(board=board, core=core)
+        left.plot(names, [int(row[name]) for name in names], marker, color=colour, label=label)
+    left.set_yscale("log")
+    left.set_ylabel("instructions a tick, mean")
+    left.set_ylim(100, 3e5)
+    left.legend(fontsize="small", loc="upper left")
+    measured = [form.split(", ")[-3] if form.count(",") > 1 else "kapitza" for form in sizes.column("form")]
+    base = [0.0] * len(sizes.rows)
+    for column, colour, label in (("text", WEAK, "code"), ("tables", OTHER, "tables"), ("bss", REFINED, "RAM")):
+        kilobytes = [int(cell) / 1000 for cell in sizes.column(column)]
+        right.bar(measured, kilobytes, bottom=base, color=colour, label=label)
+        base = [below + one for below, one in zip(base, kilobytes, strict=True)]
+    right.set_ylabel("kB, Cortex-M4F, float32")
+    right.set_ylim(0, 60)
+    right.legend(fontsize="small", loc="upper left", ncols=3)
+    for axis in (left, right):
+        axis.tick_params(axis="x", rotation=40)
+
+
+def of_cost() -> list[str]:
+    """Sentences below the figure."""
+    lines = []
+    sizes = results_of("sizes")
+    for target, form in (
+        ("Cortex-M4F (mps2-an386)", "weak, f32"),
+        ("Cortex-M4F (mps2-an386)", "refined, f32"),
+        ("Cortex-M0 (microbit)", "weak, q31"),
+    ):
+        (row,) = sizes.where(target=target, form=form)
+        lines.append(
+            f"- `kapitza`, {form}, {target.split(' ')[0]}: {row['mean']} instructions a tick, {row['longest']} in the "
+            f"longest; bytes: {row['bss']} of state, {row['stack bound']} of stack, {row['text']} of code, "
+            f"{row['tables']} of tables."
+        )
+    first, *_, last = [row for row in results_of("cycles").where() if "f32" in row["identifier"]]
+    lines.append(
+        f"- Clock cycles of a tick on a simulated CV32E40P: {first['mean']} ({first['identifier']}, {first['FPU']}) to "
+        f"{last['mean']} ({last['identifier']}, {last['FPU']}), {last['longest']} in the longest."
+    )
+    ticks = {
+        (core, name): int(row[name])
+        for core, board in (("f32", "RV32IMAFC (virt-rv32imafc)"), ("q31", "RV32IMAC (virt-rv32imac)"))
+        for row in results_of("model-boards").where(board=board, core=core)
+        for name in ("kapitza", "dc_motor")
+    }
+    cycles = [(row["identifier"].split(", "), int(row["mean"])) for row in results_of("cycles").where()]
+    ratios = [mean / ticks[core, name] for (_, core, name), mean in cycles]
+    lines.append(f"- Cycles per instruction there: {min(ratios):.1f} to {max(ratios):.1f}.")
+    choices = results_of("build-choices")
+    smallest = min(choices.where(), key=lambda row: int(row["text"]))
+    lines.append(
+        f"- Smallest build of the first stage: {smallest['text']} bytes of code, {smallest['mean']} instructions."
+    )
+    played = [
+        row["bits"]
+        for name in ("model-boards", "strong-mechanisms", "strong-fixed")
+        for row in results_of(name).where()
+    ]
+    lines.append(
+        f"- Bits: those of the PC in {played.count('equal')} of {len(played) - played.count('-')} rows of mechanisms "
+        "on boards."
+    )
+    return lines
+
+
+# ---- missing effects
+
+CAMPAIGNS = ("missing-campaign-32", "missing-campaign-73", "missing-campaign-1313")
+
+
+def draw_missing(figure: Figure) -> None:
+    """The campaign: of recordings that are off and have a nameable cause, which were named."""
+    axis = figure.subplots()
+    table = results_of(CAMPAIGNS[0])
+    rows = [row for row in table.where() if row["plant"] != "all"]
+    plants = [row["plant"] for row in rows]
+    right, wrong, named = (
+        [int(row[key]) for row in rows] for key in ("named rightly", "named wrongly", "of these have a name")
+    )
+    off = [int(row["with a parameter more than 2 % off"]) for row in rows]
+    warned = [max(0, many - ok - bad) for many, ok, bad in zip(named, right, wrong, strict=True)]
+    rest = [many - ok - bad - other for many, ok, bad, other in zip(off, right, wrong, warned, strict=True)]
+    base = [0] * len(rows)
+    for heights, colour, label in (
+        (right, REFINED, "named rightly"),
+        (wrong, BAD, "named wrongly"),
+        (warned, WEAK, "not named"),
+        (rest, OTHER, "effect is not in the library"),
+    ):
+        axis.bar(plants, heights, bottom=base, color=colour, label=label)
+        base = [below + one for below, one in zip(base, heights, strict=True)]
+    axis.set_ylabel("recordings, a parameter > 2 % off")
+    axis.set_ylim(0, 18)
+    axis.legend(fontsize="small", ncols=2, loc="upper left")
+
+
+def of_missing() -> list[str]:
+    """Sentences below the figure."""
+    sums = sums_of("missing-sum")
+    effects, silent, without, off, right, wrong, clean, warned, inside = sums.values()
+    lines = [
+        f"- Table of effects: wrong without a warning are {silent} of {effects} recordings with an effect ({without} "
+        f"without the model's part of the s.e.); warned are {warned} of {clean} without one. Named rightly are {right} "
+        f"of {off} that are more than 2 % off, wrongly {wrong}. Two s.e. contain {inside} % of the parameters.",
+    ]
+    for name in CAMPAIGNS:
+        (row,) = results_of(name).where(plant="all")
+        named, nameable = int(row["named rightly"]), int(row["of these have a name"])
+        lines.append(
+            f"- Campaign, seed {name.rpartition('-')[2]}: wrong without a warning are {row['wrong without a warning']} "
+            f"of {row['recordings with effects']} with an effect; warned are {row['of these with a warning']} of "
+            f"{row['recordings without an effect']} without one. Named rightly are {named} of {nameable} "
+            f"({100 * named / nameable:.0f} %), wrongly {row['named wrongly']}."
+        )
+    return lines
+
+
+# ---- recordings
+
+
+def draw_recordings(figure: Figure) -> None:
+    """What is not explained of a run that was not fitted: identified here, and published."""
+    axis = figure.subplots()
+    rows = [row for name in ("predictions", "kept-predictions") for row in results_of(name).where()]
+    labels = [f"{row['rig']} {row['sensor']}" for row in rows]
+    for key, marker, colour, label in (
+        ("of the second, published", "x", OTHER, "with the published parameters"),
+        ("R^2 of the second run from the first", "o", WEAK, "with those identified on the first run"),
+    ):
+        some = [(100 * (1 - float(row[key])), at) for at, row in enumerate(rows) if row[key] != "-"]
+        axis.plot(*zip(*some, strict=True), marker, color=colour, label=label)
+    axis.set_yticks(range(len(labels)), labels)
+    axis.invert_yaxis()
+    axis.set_xscale("log")
+    axis.set_xlabel("unexplained part of the second run, 1 - R², %")
+    axis.legend(fontsize="small")
+
+
+def of_recordings() -> list[str]:
+    """Sentences below the figure."""
+    rows = [row for name in ("predictions", "kept-predictions") for row in results_of(name).where()]
+    r2 = [float(row["R^2 of the second run from the first"]) for row in rows]
+    beside = [row for row in rows if row["of the second, published"] != "-"]
+    better = sum(
+        float(row["R^2 of the second run from the first"]) > float(row["of the second, published"]) for row in beside
+    )
+    back = {row["rig"] for row in rows if float(row["of the first from the second"]) < 0.9}
+    beyond = [row for name in ("verdicts", "kept-verdicts") for row in results_of(name).where()]
+    clash = [
+        f"{row['beyond 4 s.e. between the runs']} of `{row['rig']}`"
+        for row in beyond
+        if row["beyond 4 s.e. between the runs"] != "-"
+    ]
+    cell = [row for row in results_of("cell").rows if row[3].startswith("drive")]
+    return [
+        f"- {len({row['rig'] for row in rows})} rigs, {len(rows)} sensors: R² of the second run {min(r2):.2f} to "
+        f"{max(r2):.4f}; above that of the published parameters for {better} of {len(beside)}.",
+        f"- The other way round it is below 0.9 for {', '.join(f'`{one}`' for one in sorted(back))}.",
+        f"- Parameters of the two runs that differ by more than 4 standard errors: {', '.join(clash)}.",
+        "- A simulated cell (PyBaMM), which is no RC circuit: error of the predicted voltage "
+        + ", ".join(f"{row[4]} mV ({row[0]}, {'1' if 'mild' in row[3] else '2.5'} A)" for row in cell)
+        + ".",
+    ]
+
+
+# ---- robustness
+
+
+def draw_robustness(figure: Figure) -> None:
+    """Accidents of a recording: the largest error, and whether there is a warning."""
+    axis = figure.subplots()
+    table = results_of("accidents")
+    kinds = _names(table.column("accident"))
+    for name, marker in zip(_names(table.column("mechanism")), "os", strict=True):
+        for warned, colour in ((False, WEAK), (True, BAD)):
+            rows = [row for row in table.where(mechanism=name) if (row["warned"] != "0") == warned]
+            at = [kinds.index(row["accident"]) for row in rows]
+            label = f"{name}, {'with a warning' if warned else 'no warning'}"
+            axis.plot(_numbers([row["largest, s.e."] for row in rows]), at, marker, color=colour, label=label)
+    axis.axvline(4.0, color="k", linewidth=0.8)
+    axis.set_yticks(range(len(kinds)), kinds)
+    axis.invert_yaxis()
+    axis.set_xlabel("largest error of a parameter, standard errors (wrong: beyond 4 without a warning)")
+    axis.legend(fontsize="small", loc="center right")
+
+
+def of_robustness() -> list[str]:
+    """Sentences below the figure."""
+    accidents, attack, longevity = (results_of(name) for name in ("accidents", "attack", "longevity"))
+    liar, codec, log, link = (sums_of(name) for name in ("liar", "codec", "log", "fuzz-link"))
+    api, field = sums_of("fuzz-api"), sums_of("field-log")
+    years = [sums_of(f"year-{core}") for core in ("f32", "q31")]
+    (rigs,), (senseless,) = results_of("random-models").where(kind="all"), results_of("senseless-models").where()
+    long = results_of("long").column("result")
+    mutated = zip(attack.column("mutants"), attack.column("attacked with"), strict=True)
+    frames = log["frames in a minute of processor time"] / 1e6
+    early, late = (log[name] // 1000 for name in ("resident memory after a quarter, kB", "at the end, kB"))
+    marked = sum("**" in cell or "NOT" in cell for row in longevity.rows for cell in row)
+    return [
+        f"- Accidents: {sum(map(int, accidents.column('wrong, no warning')))} wrong answers without a warning in "
+        f"{len(accidents.rows)} rows of two runs.",
+        f"- `bench liar`, a board that sends false data: {liar['behaviours']} behaviours, {liar['runs of a command']} "
+        f"runs of a command, {liar['mutants of frames']} mutants of frames: {liar['defects']} defects; at most "
+        f"{liar['largest memory of the logger, kB'] // 1024} MB of memory, "
+        f"{liar['latest end of the logger, ms'] / 1000} s late.",
+        f"- `bench attack`, mutants: {', '.join(map(' '.join, mutated))}: "
+        f"{sum(map(int, attack.column('defects')))} defects.",
+        f"- `bench codec`, {codec['corrupted frames']} corrupted frames: {codec['accepted with wrong content']} "
+        f"accepted with wrong content; the second good frame behind is lost "
+        f"{codec['second good frame behind lost']} times.",
+        f"- `bench fuzz-link`, {link['inputs']} inputs: {link['failures']} failures. `bench fuzz-api`, "
+        f"{api['calls of step']} calls of `step`: no failure; {api['of these with an estimate published']} of "
+        f"{api['runs of garbage with valid settings']} runs of garbage published an estimate.",
+        f"- `bench log`: {frames:.1f} million frames in a minute of one core, {log['lost']} lost; {early} MB of memory "
+        f"after a quarter, {late} MB at the end.",
+        f"- `bench field-log`, an hour at 1 kHz, the board killed twice, its line closed once: "
+        f"{field['missing between them']} of {field['samples recorded']} samples missing; the log "
+        f"names {field['taken while the line was closed']} that were taken while the line was closed.",
+        f"- `bench year`: {years[0]['passages of 2^32 ticks']} passages of 2^32 ticks, "
+        f"{sum(one['faults'] for one in years)} faults.",
+        f"- `bench longevity`: {len(longevity.rows)} rows of a million ticks, {marked} cells silently wrong or not "
+        "finite.",
+        f"- `bench random-models`, {rigs['rigs']} random rigs: {rigs['failures']} failures, {rigs['good']} with status "
+        f"`good`, off by at most {rigs['largest of good']} s.e.; {senseless['models']} descriptions without sense: "
+        f"{senseless['tracebacks']} tracebacks.",
+        f"- `bench long`, the long tests: {long.count('passed')} of {len(long)} passed.",
+    ]
+
+
+# ---- other methods
+
+
+def draw_methods(figure: Figure) -> None:
+    """The worst parameter of each method."""
+    axis = figure.subplots()
+    table = results_of("compare-methods")
+    names = _names(table.column("mechanism"))
+    for place, (method, start, label) in enumerate(_METHODS):
+        marker, colour = "osD^v"[place], (WEAK, "C1", REFINED, OTHER, BAD)[place]
+        rows = [row for row in table.where(method=method, **{"start off": start}) if row["worst parameter %"] != "-"]
+        axis.plot(
+            [names.index(row["mechanism"]) + 0.12 * (place - 2) for row in rows],
+            _numbers([row["worst parameter %"] for row in rows]),
+            marker,
+            color=colour,
+            alpha=0.8,
+            label=label,
+        )
+    axis.axhline(5.0, color="k", linewidth=0.8)
+    axis.set_xticks(range(len(names)), names, rotation=20)
+    axis.set_yscale("log")
+    axis.set_ylabel("worst parameter, %")
+    axis.set_ylim(1e-3, 1e4)
+    axis.legend(fontsize="small", ncols=2, loc="upper left")
+
+
+_METHODS = (
+    ("weak form (this project)", "+-50 %", "pvid, first stage, start up to 50 % off"),
+    ("strong form, best Savitzky-Golay filter", "none", "Derivatives, best of 12 filters"),
+    ("output error (scipy)", "1 %", "Output error, start 1 % off"),
+    ("output error (scipy)", "30 %", "Output error, start 30 % off"),
+    ("weak form of pysindy", "no start", "pysindy, weak form"),
+)
+
+
+def of_methods() -> list[str]:
+    """Sentences below the figure."""
+    table = results_of("compare-methods")
+    lines = []
+    for method, start, label in _METHODS:
+        rows = table.where(method=method, **{"start off": start})
+        ran = [row for row in rows if row["worst parameter %"] != "-"]
+        near = [tuple(map(int, row["runs with every parameter within 5 %"].split("/"))) for row in ran]
+        seconds = _numbers([row["s a run"] for row in ran])
+        lines.append(
+            f"- {label}: {len(ran)} of {len(rows)} mechanisms; within 5 % in {sum(one for one, _ in near)} of "
+            f"{sum(of for _, of in near)} runs; {min(seconds):.2g} to {max(seconds):.2g} s a run."
+        )
+    rows = table.where(method=_METHODS[2][0], **{"start off": "1 %"})
+    mine = {row["mechanism"]: _number(row["median parameter %"]) for row in table.where(method=_METHODS[0][0])}
+    better = [row["mechanism"] for row in rows if _number(row["median parameter %"]) < mine[row["mechanism"]]]
+    lines.append(
+        f"- Output error from 1 % off has a smaller median error than pvid's first stage on {len(better)} of "
+        f"{len(rows)}: {', '.join(f'`{one}`' for one in better)}."
+    )
+    return lines
+
+
+# ---- the page
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section of the page: its marker and picture's name, the tables it draws, how, the sentences, inches."""
+
+    name: str
+    tables: tuple[str, ...]
+    draw: Callable[[Figure], None]
+    sentences: Callable[[], list[str]]
+    size: tuple[float, float] = (9.0, 4.2)
+
+    @property
+    def digest(self) -> str:
+        """Of the tables that the picture shows."""
+        shown = [(one.header, one.rows) for one in map(results_of, self.tables)]
+        return hashlib.sha256(repr(shown).encode()).hexdigest()[:16]
+
+    def picture(self) -> bytes:
+        """As PNG, with the digest as its description."""
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=self.size, layout="constrained")
+        self.draw(figure)
+        for axis in figure.axes:
+            axis.grid(alpha=0.3)
+        stream = io.BytesIO()
+        figure.savefig(stream, dpi=_DPI, format="png", metadata={"Description": self.digest})
+        return stream.getvalue()
+
+
+PARTS = (
+    Part("accuracy", ("refine-mechanisms", "mechanisms-chosen"), draw_accuracy, of_accuracy),
+    Part("cost", ("model-boards", "sizes-models"), draw_cost, of_cost),
+    Part("missing", (CAMPAIGNS[0],), draw_missing, of_missing, (9.0, 3.4)),
+    Part("recordings", ("predictions", "kept-predictions"), draw_recordings, of_recordings),
+    Part("robustness", ("accidents",), draw_robustness, of_robustness, (9.0, 4.6)),
+    Part("methods", ("compare-methods",), draw_methods, of_methods),
+)
+
+
+def write_page(folder: Path = IMAGES, page: Path = PAGE) -> None:
+    """Draws the pictures and writes the sentences of every section."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for part in PARTS:
+        write_whole(folder / f"{part.name}.png", part.picture(), freely=True)
+        write_whole(page, with_table(page, part.name, "\n".join(part.sentences())), freely=True)
