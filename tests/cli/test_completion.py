@@ -37,7 +37,7 @@ def test_there_is_a_line_for_each_shell(shell: str) -> None:
 
 
 def test_what_is_nearly_a_command_is_proposed() -> None:
-    near = CliRunner().invoke(commands, ["identfy", "run.csv"])
-    assert near.exit_code == 2 and "there is no command 'identfy': did you mean identify?" in near.stderr
+    near = CliRunner().invoke(commands, ["identifx", "run.csv"])
+    assert near.exit_code == 2 and "there is no command 'identifx': did you mean identify?" in near.stderr
     far = CliRunner().invoke(commands, ["qqq"])
     assert far.exit_code == 2 and "there is no command 'qqq'" in far.stderr and "mean" not in far.stderr
