@@ -1,4 +1,5 @@
-"""Mechanisms whose drive is differentiated, their recordings, and answers of the weak form to refine."""
+"""Mechanisms to refine, their recordings, and answers of the weak form: two whose drive is differentiated, a shipped
+one with an input, and two in files of one's own, one of them without an input."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from math import pi
 
 import numpy as np
 import numpy.typing as npt
+from own_mechanisms import OWN, own_recording
 from pendulum_plant import STANDARD_DRIVE, STANDARD_PENDULUM, Pendulum, simulate, standard_sensors
 from test_own_mechanisms import read, recorded
 
@@ -21,28 +23,32 @@ from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.verdict import Judged
 from pvid.rig.run import Recording
+from pvid.sim.simulated_run import simulation_of
 
 Float = npt.NDArray[np.float64]
 
 DAMPED = replace(STANDARD_PENDULUM, damping1=2e-3, damping2=5e-4)  # [m^2/s]
 PENDULUM = dict(zip(("w", "d1", "d2", "c"), (*STANDARD_PENDULUM.linear, 0.02), strict=True))
 ISOLATED = {"c": 3.0, "k": 400.0, "x0": 1e-3}
-_OFFSETS = ("c", "x0")
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A mechanism: compiled, its true parameters, its differentiated sensor, and the one that a play may hold back."""
+    """A mechanism: compiled, its true parameters, and a recording of it."""
 
     model: CompiledModel
     truth: Mapping[str, float]
-    driven: str
-    played: str
+    recording: Recording
 
     @property
     def p(self) -> Float:
         """Truth in the order of the model."""
         return np.array([self.truth[name] for name in self.model.p_names])
+
+    @property
+    def positive(self) -> npt.NDArray[np.bool_]:
+        """Which of the parameters are."""
+        return np.array([one.positive for one in self.model.unknowns])
 
 
 def pendulum_model(bits: int = 16) -> CompiledModel:
@@ -73,7 +79,7 @@ def pendulum_run(
     return simulate(of, STANDARD_DRIVE, sensors, 1000.0, 20.0, release, "full", seed).run.recording
 
 
-def isolator_run(skew: float = 0.0) -> Recording:
+def isolator_run(skew: float = 0.0, of: Mapping[str, float] = ISOLATED) -> Recording:
     """16 s at 500 Hz; the frame's sensor is read `skew` [s] early."""
     dt, n = 1 / 500, 8000
     t = np.arange(n) * dt
@@ -82,20 +88,28 @@ def isolator_run(skew: float = 0.0) -> Recording:
         s = 2j * pi * hz
         wave = size * np.exp(1j * phase)
         frame += (wave * np.exp(s * (t - skew))).real
-        moved += (-(s**2) * wave * np.exp(s * t) / (s**2 + ISOLATED["c"] * s + ISOLATED["k"])).real
-    return recorded(dt, b=read(frame, 1e-6, 1), x=read(moved + ISOLATED["x0"], 1e-5, 2))
+        moved += (-(s**2) * wave * np.exp(s * t) / (s**2 + of["c"] * s + of["k"])).real
+    return recorded(dt, b=read(frame, 1e-6, 1), x=read(moved + of["x0"], 1e-5, 2))
 
 
 @cache
-def subject(name: str) -> Subject:
+def subject(name: str, skew: float = 0.0) -> Subject:
+    """Of a driven sensor that is read `skew` [s] early."""
     if name == "kapitza":
-        return Subject(pendulum_model(), PENDULUM, "y", "phi")
-    return Subject(isolator_model(), ISOLATED, "b", "x")
+        return Subject(pendulum_model(), PENDULUM, pendulum_run(skew))
+    if name == "isolator":
+        return Subject(isolator_model(), ISOLATED, isolator_run(skew))
+    if name in OWN:
+        model = OWN[name].compiled
+        return Subject(model, {one.name: one.guess for one in model.unknowns}, own_recording(name))
+    simulation = simulation_of(name)
+    run = {one: values[:6000] for one, values in simulation.run(1).items()}
+    recording = Recording(run.pop("t"), run, simulation.rig.sample_rate)
+    return Subject(simulation.model, simulation.rig.truth, recording)
 
 
-@cache
 def run_of(name: str, skew: float = 0.0) -> Recording:
-    return pendulum_run(skew) if name == "kapitza" else isolator_run(skew)
+    return subject(name, skew).recording
 
 
 @cache
@@ -109,9 +123,9 @@ def answer_of(
     """An answer of the weak form with parameters off by a factor or its inverse in turn; it determines all but those
     of `lacking`."""
     weak, of = _weak(name), subject(name)
-    factors = [1.0 if one in _OFFSETS else factor ** (-1) ** k for k, one in enumerate(of.model.p_names)]
+    factors = [factor ** (-1) ** k if positive else 1.0 for k, positive in enumerate(of.positive)]
     judged = tuple(Judged("not_identified", "for a test") if one in lacking else Judged() for one in of.model.p_names)
-    found = replace(weak.found, p=of.p * np.array(factors), judged=judged)
+    found = replace(weak.found, p=of.p * factors, judged=judged)
     return replace(weak, found=found, recording=weak.recording if recording is None else recording)
 
 
@@ -133,14 +147,19 @@ def errors_of(refined: RefinedMechanism, truth: Mapping[str, float]) -> tuple[Fl
     return values, np.sqrt(np.diag(refined.found.covariance))[list(refined.main)]
 
 
+def errors_over_se(refined: RefinedMechanism, of: Subject) -> Float:
+    """Of the parameters in the order of the model."""
+    return np.array([(refined.values[name] - of.truth[name]) / refined.errors[name] for name in of.model.p_names])
+
+
 def changed(recording: Recording, **signals: Float) -> Recording:
     """The recording with other samples of some signals."""
     return replace(recording, signals={**recording.signals, **signals})
 
 
-def shaken(recording: Recording, amplitude: float, hz: float) -> Recording:
-    """With a vibration of the pendulum's encoder [rad] that no equation has."""
-    return changed(recording, phi=recording.signals["phi"] + amplitude * np.sin(2 * pi * hz * recording.t))
+def shaken(recording: Recording, sensor: str, amplitude: float, hz: float) -> Recording:
+    """With a vibration of a sensor that no equation has."""
+    return changed(recording, **{sensor: recording.signals[sensor] + amplitude * np.sin(2 * pi * hz * recording.t)})
 
 
 def played(x: Float, half: float) -> Float:
