@@ -1,19 +1,16 @@
-"""A board in the field, played by the C core on this machine: what it would send, and the same on a pseudo-terminal.
-
-python field_board.py LINK '{"ticks": 5000, ...}'     one run; LINK becomes a symbolic link to the terminal
-"""
+"""A board in the field, played by the C core on this machine: what it would send, and the same on a pseudo-terminal."""
 
 from __future__ import annotations
 
 import itertools
-import json
 import os
-import sys
+import signal
 import time
 import tty
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -152,13 +149,15 @@ def messages(field: Field, session: int = 7) -> Iterator[tuple[int, link.Message
         raw = replace(link.Raw.of_values(*samples[first:last].T), session=session)
         sample_hash = fnv.fold_bytes(sample_hash, raw.data)
         yield at, raw
-        for tick in range(first, last):
-            reason = int(identifier.run_samples(samples[tick : tick + 1], sums=False).reason[0])
-            verdict = verdict if reason == Reason.ACCUMULATED else reason
-            done = field.first_tick + tick + 1
-            if field.estimate_every and (tick + 1) % field.estimate_every == 0:
+        reports = [every for every in (field.estimate_every, field.hash_every) if every]
+        ends = {tick for tick in range(first + 1, last) if any(tick % every == 0 for every in reports)}
+        for begun, end in itertools.pairwise(sorted({first, *ends, last})):
+            reasons = identifier.run_samples(samples[begun:end], sums=False).reason
+            verdict = next((int(one) for one in reasons[::-1] if one != Reason.ACCUMULATED), verdict)
+            done = field.first_tick + end
+            if field.estimate_every and end % field.estimate_every == 0:
                 yield done, estimate_of(identifier, session, verdict)
-            if field.hash_every and (tick + 1) % field.hash_every == 0:
+            if field.hash_every and end % field.hash_every == 0:
                 yield done, link.Hash(session, hash=identifier.running_hash, sample_hash=sample_hash)
 
 
@@ -205,22 +204,36 @@ class PtyLine:
             data = data[os.write(self.ours, data) :]
 
 
-def main() -> None:
-    """See the module."""
-    place, settings = Path(sys.argv[1]), json.loads(sys.argv[2])
-    if "cheap" in settings:
-        sent = cheap_frames(settings["cheap"])
-    else:
-        field = Field(settings["ticks"], settings.get("seed", 1), settings.get("estimate_every", 500))
-        computed = list(messages(field))  # before anybody waits
-        sent = frames(in_time(computed, settings.get("per_second", 0)))
+@cache
+def sent_by(field: Field) -> list[tuple[int, link.Message]]:
+    """All that a board sends in a run, computed before anybody waits."""
+    return list(messages(field))
+
+
+def _serve(place: Path, sent: list[tuple[int, link.Message]], per_second: int) -> None:
     line = PtyLine(place)
     line.await_word()
-    for frame in sent:
+    for frame in frames(in_time(sent, per_second)):
         line.write(frame)
-    print("sent", flush=True)
-    sys.stdin.readline()  # what was sent and not yet read is lost with this process
+    signal.pause()  # what was sent and not yet read is lost with this process
 
 
-if __name__ == "__main__":
-    main()
+class Board:
+    """A board behind a symbolic link, in a fork of this process; `per_second`: ticks, 0: at once."""
+
+    def __init__(
+        self, place: Path, ticks: int, *, seed: int = 1, estimate_every: int = 500, per_second: int = 0
+    ) -> None:
+        self._place = place
+        given = place, sent_by(Field(ticks, seed, estimate_every)), per_second
+        self._process = get_context("fork").Process(target=_serve, args=given, daemon=True)
+        self._process.start()
+        limit = time.monotonic() + 60
+        while not place.exists() and time.monotonic() < limit:
+            time.sleep(0.02)
+
+    def kill(self) -> None:
+        """The board is gone, with its line."""
+        self._place.unlink(missing_ok=True)  # the terminal's name may soon be that of somebody else's
+        self._process.kill()
+        self._process.join()

@@ -26,7 +26,6 @@ import numpy.typing as npt
 import pytest
 import serial
 from click.testing import CliRunner
-from conftest import ROOT
 
 from bench.field import field_log, throughput
 from pvid.base import file_lock
@@ -278,26 +277,7 @@ def test_a_log_of_another_version_opens(tmp_path: Path) -> None:
 # ---- the program
 
 
-class Board:
-    """field_board.py as a process behind a symbolic link."""
-
-    def __init__(self, place: Path, **settings: int) -> None:
-        self.place = place
-        command = [sys.executable, str(ROOT / "tests" / "field_board.py"), str(place), json.dumps(settings)]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-    def has_sent(self) -> None:
-        """Waits until it has sent all."""
-        assert self.process.stdout is not None
-        assert self.process.stdout.readline() == "sent\n"
-
-    def kill(self) -> None:
-        self.place.unlink(missing_ok=True)  # the terminal's name may soon be that of somebody else's
-        self.process.kill()
-        self.process.communicate()
-
-
-Boards = Callable[..., Board]
+Boards = Callable[..., field_board.Board]
 Loggers = Callable[..., "subprocess.Popen[str]"]
 
 
@@ -306,11 +286,8 @@ def boards(tmp_path: Path) -> Iterator[Boards]:
     """Starts boards behind tmp_path/board."""
     started = []
 
-    def start(**settings: int) -> Board:
-        started.append(Board(tmp_path / "board", **settings))
-        limit = time.monotonic() + 60
-        while not (tmp_path / "board").exists() and time.monotonic() < limit:
-            time.sleep(0.02)
+    def start(ticks: int, **settings: int) -> field_board.Board:
+        started.append(field_board.Board(tmp_path / "board", ticks, **settings))
         return started[-1]
 
     yield start
@@ -338,11 +315,14 @@ def pvid(tmp_path: Path) -> Iterator[Loggers]:
 
 def wait_for(path: Path, condition: Callable[[Account], bool]) -> Account:
     """Until the account of a log that grows is so."""
-    limit = time.monotonic() + 60
+    limit, stream, fed = time.monotonic() + 60, LogStream(), 0
     while time.monotonic() < limit:
         if path.exists():
-            stream = LogStream()
-            list(stream.feed(path.read_bytes()))
+            with path.open("rb") as file:
+                file.seek(fed)
+                more = file.read()
+            fed += len(more)
+            list(stream.feed(more))
             if condition(stream.account):
                 return stream.account
         time.sleep(0.05)

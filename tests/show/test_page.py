@@ -20,7 +20,6 @@ import numpy as np
 import pytest
 from browser import chromium
 from click.testing import CliRunner
-from conftest import ROOT
 from selenium import webdriver
 
 from pvid.base.errors import PvidError
@@ -201,13 +200,9 @@ def test_every_beginning_of_a_log_has_a_state(sent: list[bytes], tmp_path: Path)
 def board(tmp_path: Path) -> Iterator[Path]:
     """A board behind a symbolic link that samples for 40 s, in time."""
     place = tmp_path / "board"
-    program = str(ROOT / "tests" / "field_board.py")
-    command = [sys.executable, program, str(place), '{"ticks": 40000, "estimate_every": 100, "per_second": 1000}']
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    until(place.exists, 30)
+    playing = field_board.Board(place, 40_000, estimate_every=100, per_second=1000)
     yield place
-    process.kill()
-    process.communicate()
+    playing.kill()
 
 
 @pytest.fixture

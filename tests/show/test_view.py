@@ -18,7 +18,6 @@ from pathlib import Path
 import field_board
 import numpy as np
 import pytest
-from conftest import ROOT
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -270,16 +269,9 @@ def test_a_flood_is_drawn_as_what_comes_slowly(sent: list[bytes]) -> None:
 def board(tmp_path: Path) -> Iterator[Path]:
     """A board that sends TICKS behind a symbolic link."""
     place = tmp_path / "board"
-    program = str(ROOT / "tests" / "field_board.py")
-    process = subprocess.Popen(
-        [sys.executable, program, str(place), f'{{"ticks": {TICKS}}}'], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    limit = time.monotonic() + 60
-    while not place.exists() and time.monotonic() < limit:
-        time.sleep(0.02)
+    playing = field_board.Board(place, TICKS)
     yield place
-    process.kill()
-    process.communicate()
+    playing.kill()
 
 
 class Terminal:
