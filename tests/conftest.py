@@ -27,26 +27,25 @@ settings.load_profile("seeded")
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = """
-    cli/identify_in_c cli/cli bench/random_models oracle/missing twin/weak_q31 identification/work cli/identify_run
-    board/memory cli/design_cost log/log paper/paper identification/refined_search cli/run_input
-    identification/refined_answer bench/refine_mechanisms show/answer_figure board/stream bench/attack board/ports
-    identification/additions deploy/deploy twin/weak_f32 identification/mechanism_advice cli/api show/page
-    codegen/build bench/liar oracle/samples cli/demo_run identification/refined_kinds codegen/strong_model
-    identification/judge tools/pages core/trust_q31 identification/scale_errors board/targets
-    identification/own_mechanisms show/view core/core_q31 identification/refined twin/second_stage
-    board/refined_board tools/wheel board/strong_image cli/several board/mechanism_board board/field
-    core/read_while_stepping cli/foreign_files identification/several_recordings identification/following fleet/batch
-    board/refined_stream codegen/generated_q31 bench/mechanisms cli/readme log/verify log/witness oracle/weak_in_c
-    board/weak_boards core/weak_rows_q31 core/arithmetic_options codegen/weak_c core/recorded_hashes
-    codegen/model_q31 oracle/feedback codegen/generated_f32 oracle/weak_identify bench/accidents core/sizes_agree
-    twin/state bench/year tools/notebooks oracle/corners model/elimination twin/kinds_q31 tools/core_rooms
-    oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link twin/runs_begin oracle/scale
-    identification/refined_length board/generated twin/refinement codegen/refine core/dropped_calls sim/rigs
-    core/bad_config bench/longevity core/model_library core/equation_error tools/docs identification/wild_samples
-    board/port bench/strong_mechanisms cli/output tools/proofs log/untrusted show/pictures tools/loops
-    oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random bench/hard bench/verifying
-    log/export log/text_table core/dead_zone tools/mutate bench/model_boards deploy/deploy_avr identification/skew
-    bench/build_choices
+    cli/cli cli/identify_in_c cli/identify_run oracle/missing identification/refined_search bench/random_models
+    log/log show/page twin/weak_q31 identification/work board/memory identification/mechanism_advice
+    codegen/strong_model cli/design_cost paper/paper cli/run_input bench/refine_mechanisms show/answer_figure
+    board/stream bench/attack identification/refined_answer identification/refined_kinds oracle/samples board/ports
+    identification/additions deploy/deploy twin/weak_f32 codegen/build bench/liar cli/demo_run identification/judge
+    tools/pages core/trust_q31 cli/api identification/scale_errors board/targets identification/own_mechanisms
+    core/core_q31 identification/refined twin/second_stage show/view board/refined_board tools/wheel
+    board/strong_image cli/several board/mechanism_board board/field core/read_while_stepping cli/foreign_files
+    identification/several_recordings fleet/batch board/refined_stream codegen/generated_q31 bench/mechanisms
+    cli/readme log/verify log/witness oracle/weak_in_c board/weak_boards core/weak_rows_q31 core/arithmetic_options
+    codegen/weak_c core/recorded_hashes codegen/model_q31 oracle/feedback codegen/generated_f32 oracle/weak_identify
+    bench/accidents core/sizes_agree twin/state bench/year tools/notebooks oracle/corners model/elimination
+    twin/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
+    twin/runs_begin oracle/scale identification/refined_length board/generated twin/refinement codegen/refine
+    core/dropped_calls sim/rigs core/bad_config bench/longevity core/model_library core/equation_error tools/docs
+    identification/wild_samples board/port bench/strong_mechanisms cli/output tools/proofs log/untrusted
+    show/pictures tools/loops oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random
+    bench/hard bench/verifying log/export log/text_table core/dead_zone tools/mutate bench/model_boards
+    deploy/deploy_avr identification/skew bench/build_choices
 """.split()
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")

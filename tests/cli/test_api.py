@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from own_mechanisms import OWN, own_recording
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import pvid
@@ -111,11 +112,19 @@ def test_a_mechanism_of_the_list_is_identified(tmp_path: Path) -> None:
     assert result.plot(tmp_path / "motor.png").exists()
     in_c = pvid.identify(path, core="f32")
     assert in_c.identified and in_c.details["core"] == "f32" and in_c["R"].value == pytest.approx(1.2, rel=1e-3)
-    assert result.advice == () and result.details["advice"] == []
-    negated = pvid.identify(path, columns="V=V:-1")
-    sentence = "V seems to have the opposite sign: --columns V=V:-1"
-    assert negated.advice == (sentence,) and negated.details["advice"] == [sentence]
-    assert f"advice: {sentence}" in str(negated) and sentence in negated._repr_html_()
+
+
+def test_a_model_file_is_identified_and_advice_is_part_of_the_result() -> None:
+    name, sentence = "heated_plate", "P seems to have the opposite sign: --columns P=P:-1 (or T: --columns T=T:-1)"
+    recording, model = own_recording(name), OWN[name].path
+    data = {"t": recording.t, **recording.signals}
+    for result in (pvid.identify(data, model=model), pvid.identify(data, model=model, core="f32")):
+        assert result.identified and result.advice == () and result.details["advice"] == []
+        for one in OWN[name].compiled.unknowns:
+            assert abs(result[one.name].value - one.guess) < 4 * result[one.name].se
+    wrong = pvid.identify(data, model=model, columns="P=P:-1")
+    assert wrong.advice == (sentence,) and wrong.details["advice"] == [sentence]
+    assert f"advice: {sentence}" in str(wrong) and sentence in wrong._repr_html_()
 
 
 def test_the_estimator_takes_a_model_of_ones_own() -> None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from own_mechanisms import OWN
 from pendulum_plant import STANDARD_PENDULUM, STANDARD_RELEASE, simulate
 from pendulum_run import write_run
 
@@ -18,12 +21,14 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.target import HOST_TARGET
+from pvid.board.verify_board import verify_recording
 from pvid.cli.identify_run import recording_of
 from pvid.cli.main import commands
 from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import config_to_identify
 from pvid.identification.analysis import analysed
-from pvid.identification.core import identify_in_c
+from pvid.identification.core import CoreAnswer, identify_in_c
+from pvid.identification.core_refined import RefinedCoreAnswer, refined_in_c
 from pvid.log.rig_choice import rig_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
@@ -38,36 +43,69 @@ def pvid(*arguments: str | Path) -> Result:
     return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
+RUNS: dict[str, tuple[str, ...]] = {
+    "rigid_body": ("--duration", "8"),
+    "dc_motor": ("--duration", "6"),
+    "kapitza": ("--duration", "15"),
+    "free_pendulum": ("--duration", "7", "--rate", "500", "--start", "q=2.5"),  # a file of one's own, without an input
+}
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Simulated runs by mechanism, each with its rig file beside it."""
     folder = tmp_path_factory.mktemp("recorded")
-    paths = {}
-    for name, duration in (("rigid_body", "8"), ("dc_motor", "6")):
-        paths[name] = folder / f"{name}.csv"
-        done = pvid("model", "simulate", name, paths[name], "--duration", duration, "--seed", "3")
-        assert done.return_value == DONE
+    paths = {name: folder / f"{name}.csv" for name in RUNS}
+    for name, options in RUNS.items():
+        model = OWN[name].path if name in OWN else name
+        assert pvid("model", "simulate", model, paths[name], *options, "--seed", "3").return_value == DONE
     return paths
 
 
-@pytest.mark.parametrize(("name", "arithmetic"), [("rigid_body", "f32"), ("dc_motor", "f32"), ("dc_motor", "q31")])
-def test_the_core_identifies_a_recording_as_the_oracle_does(
-    name: str, arithmetic: str, recorded: dict[str, Path]
-) -> None:
-    core = json.loads(pvid("identify", recorded[name], "--core", arithmetic, "--json").stdout)
-    oracle = json.loads(pvid("identify", recorded[name], "--json").stdout)
+Answers = Callable[..., dict[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def answers(recorded: dict[str, Path]) -> Answers:
+    """What `identify NAME OPTIONS --json` prints, once each."""
+
+    @cache
+    def answer(name: str, *options: str) -> dict[str, Any]:
+        model = ("--model", OWN[name].path) if name in OWN else ()
+        done = pvid("identify", recorded[name], *model, *options, "--json")
+        assert done.return_value == DONE, done.output
+        shown: dict[str, Any] = json.loads(done.stdout)
+        return shown
+
+    return answer
+
+
+@pytest.fixture(scope="module")
+def core(recorded: dict[str, Path]) -> CoreAnswer:
+    """Of the C core, for the rigid body."""
+    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
+    return identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
+
+
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [("rigid_body", "f32"), ("dc_motor", "f32"), ("dc_motor", "q31"), ("free_pendulum", "f32")],
+)
+def test_the_core_identifies_a_recording_as_the_oracle_does(name: str, arithmetic: str, answers: Answers) -> None:
+    core = answers(name, "--core", arithmetic)
+    oracle = answers(name, "--no-refine")
     assert set(oracle) < set(core)  # the same keys, and the core's own
     assert core["core"] == arithmetic and oracle["core"] == "f64"
     assert core["identified"] and core["reason"] == "updated" and 0.5 < core["chi2"] < 2
     assert oracle["reasons"].items() <= core["reasons"].items()
-    truth = simulated_rig(name).truth
+    truth = {one.name: one.guess for one in OWN[name].compiled.unknowns} if name in OWN else simulated_rig(name).truth
     assert list(core["parameters"]) == list(oracle["parameters"])
     for parameter, one in core["parameters"].items():
         exact = oracle["parameters"][parameter]
         assert one["unit"] == exact["unit"] and one["se"] >= one["se_noise"] > 0
-        assert abs(one["value"] - truth[parameter]) < 5 * one["se"], parameter
         # The oracle locates each reversal of friction, and chooses its own window; the core takes the mean of signs.
         assert abs(one["value"] - exact["value"]) < 5 * max(one["se"], exact["se"]), parameter
+        assert abs(one["value"] - truth[parameter]) < 5 * one["se"], parameter
 
 
 def test_the_answer_is_a_table_with_the_reason_of_the_last_window(recorded: dict[str, Path]) -> None:
@@ -77,19 +115,7 @@ def test_the_answer_is_a_table_with_the_reason_of_the_last_window(recorded: dict
     assert "last window: updated; chi2 " in answer.stdout
 
 
-def test_a_simulated_run_of_the_described_pendulum_is_identified_from_its_description(tmp_path: Path) -> None:
-    """Its rig file names the mechanism that the core has a form of its own for."""
-    run = tmp_path / "run.csv"
-    assert pvid("model", "simulate", "kapitza", run, "--duration", "20").return_value == DONE
-    answer = json.loads(pvid("identify", run, "--json").stdout)
-    assert answer["identified"] and answer["core"] == "f64"
-    truth = simulated_rig("kapitza").truth
-    assert all(abs(answer["parameters"][name]["value"] / truth[name] - 1) < 0.01 for name in ("w", "d1", "d2"))
-
-
-def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(recorded: dict[str, Path]) -> None:
-    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
+def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(core: CoreAnswer) -> None:
     assert core.verdict.status == "good"
     one = core.values["Iyz"]
     assert one.value is not None and one.se is not None
@@ -102,19 +128,15 @@ def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(recor
     )
 
 
-def test_a_core_that_has_published_nothing_is_not_called_good(recorded: dict[str, Path]) -> None:
-    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
+def test_a_core_that_has_published_nothing_is_not_called_good(core: CoreAnswer) -> None:
     silent = replace(core, published=False, reason=Reason.HELD_NOT_EXCITED)
     assert silent.verdict.status == "not_identified"
     assert silent.as_json()["status"] == "not_identified"
     assert silent.verdict.reasons[0].text == "The C core has published no estimate: held not excited."
 
 
-def test_core_and_analysis_are_compared_by_their_noise(recorded: dict[str, Path]) -> None:
+def test_core_and_analysis_are_compared_by_their_noise(core: CoreAnswer) -> None:
     """The errors of gains are the same in both: they hide no difference."""
-    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
     one = core.values["Iyz"]
     assert one.value is not None and one.se_noise is not None
     loud = replace(one, se=100 * one.se_noise)
@@ -125,10 +147,8 @@ def test_core_and_analysis_are_compared_by_their_noise(recorded: dict[str, Path]
 
 
 @pytest.mark.parametrize(("steps", "status"), [(2, "good"), (40, "warning")])
-def test_values_that_float32_does_not_resolve_are_alike(recorded: dict[str, Path], steps: int, status: str) -> None:
+def test_values_that_float32_does_not_resolve_are_alike(core: CoreAnswer, steps: int, status: str) -> None:
     """Of sensors without noise the standard errors are far below the last bit of a float."""
-    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
     one = core.values["Iyz"]
     assert one.value is not None
     exact = replace(one, value=float(np.float32(one.value)), se_noise=1e-12 * abs(one.value))
@@ -189,49 +209,28 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     assert "DIFFERENT: tick" in " ".join(answer.stdout.split())
 
 
-def test_both_stages_in_c_identify_a_recording_and_the_answer_is_the_refined_one(recorded: dict[str, Path]) -> None:
-    answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--refine")
-    assert answer.return_value == DONE
-    assert "rigid body, gyros and torques: refined, C in float32" in answer.stdout
-    assert "refined by the second stage, first after" in answer.stdout
-    shown = json.loads(pvid("identify", recorded["rigid_body"], "--core", "f32", "--refine", "--json").stdout)
-    weak = json.loads(pvid("identify", recorded["rigid_body"], "--core", "f32", "--json").stdout)
+@pytest.mark.parametrize(("name", "extras"), [("rigid_body", []), ("kapitza", ["k1", "k2", "tau"])])
+def test_both_stages_in_c_identify_a_recording_and_the_answer_is_the_refined_one(
+    name: str, extras: list[str], answers: Answers
+) -> None:
+    weak, shown = answers(name, "--core", "f32"), answers(name, "--core", "f32", "--refine")
     assert shown["identified"] and shown["refinement"]["adopted"] and shown["refinement"]["reason"] == "updated"
     assert set(weak) < set(shown) and shown["hash"] != weak["hash"] and 0.5 < shown["refinement"]["level"] < 2
-    for name, truth in simulated_rig("rigid_body").truth.items():
-        one = shown["parameters"][name]
-        assert one["value"] != weak["parameters"][name]["value"]
-        assert abs(one["value"] - truth) < 4 * one["se"], name
+    assert list(shown["parameters"]) == [*weak["parameters"], *extras]
+    for parameter, value in {**simulated_rig(name).truth, **dict.fromkeys(extras, 0.0)}.items():
+        one = shown["parameters"][parameter]
+        assert parameter in extras or one["value"] != weak["parameters"][parameter]["value"]
+        assert abs(one["value"] - value) < 4 * one["se_noise"], parameter
 
 
-def test_both_stages_in_c_refine_a_pendulum_of_its_own_rig_file(tmp_path: Path) -> None:
-    """Full equations: the linear ones of the weak form are 0.5 % off, which its standard errors contain."""
-    run = tmp_path / "run.csv"
-    assert pvid("simulate", run, "--duration", "12", "--seed", "2").return_value == DONE
-    shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
-    assert shown["refinement"]["adopted"] and list(shown["parameters"])[-3:] == ["k1", "k2", "tau"]
-    for name, truth in {**simulated_rig("kapitza").truth, "k1": 0.0, "k2": 0.0, "tau": 0.0}.items():
-        one = shown["parameters"][name]
-        assert abs(one["value"] - truth) < 3.5 * one["se_noise"], name
-    assert shown["parameters"]["w"]["se_noise"] < 1e-3 * shown["parameters"]["w"]["value"]
-    streamed = pvid("identify", run, "--core", "f32", "--refine", "--on", HOST_TARGET, "--json")
-    on_board = json.loads(streamed.stdout)
+def test_the_refined_answer_in_c_is_printed_and_is_that_of_a_board(recorded: dict[str, Path], answers: Answers) -> None:
+    answer = pvid("identify", recorded["kapitza"], "--core", "f32", "--refine", "--on", HOST_TARGET)
+    assert answer.return_value == DONE and "Kapitza" in answer.stdout and ": refined, C in float32" in answer.stdout
+    assert "refined by the second stage, first after" in answer.stdout
+    shown = answers("rigid_body", "--core", "f32", "--refine")
+    on_board = answers("rigid_body", "--core", "f32", "--refine", "--on", HOST_TARGET)
     assert on_board["on"] == HOST_TARGET and on_board["hash"] == shown["hash"]  # of both stages, at every report
     assert on_board["parameters"] == shown["parameters"]
-    answer = pvid("compare", run, "--core", "f32")
-    assert answer.return_value == DONE and "refined" in answer.stdout and answer.stdout.count("equal") == 2
-    rig = tmp_path / "described.toml"
-    step = 2 * np.pi / 2**14
-    rig.write_text(
-        f'sample_rate = 1000\n[model]\nname = "kapitza"\n[known]\nl1 = 0.3\n[sensor.phi]\nresolution = {step}\n',
-        encoding="utf-8",
-    )
-    described = json.loads(pvid("identify", run, "--rig", rig, "--refine", "--json").stdout)
-    assert "refined over" in described["refinement"]["text"]
-    for name, truth in simulated_rig("kapitza").truth.items():
-        assert abs(described["parameters"][name]["value"] - truth) < 3.5 * described["parameters"][name]["se_noise"], (
-            name
-        )
 
 
 def test_the_options_of_a_rig_file_reach_the_second_stage_in_c_and_a_board(tmp_path: Path) -> None:
@@ -242,21 +241,28 @@ def test_the_options_of_a_rig_file_reach_the_second_stage_in_c_and_a_board(tmp_p
     run = tmp_path / "run.csv"
     write_run(run, simulate(rough, duration=15.0, release=release, truth="full").run)
     rig = MechanismRig("kapitza", 1000.0, known={"l1": 0.3}, sensor={"y": {"gain_sd": 0.0}}, known_sd={"l1": 0.0})
-    rig.write(run.with_suffix(".toml"))
-    bare = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
-    assert not bare["refinement"]["adopted"]
     chosen = replace(rig, refine={"dry_friction": True, "slant": True})
     chosen.write(run.with_suffix(".toml"))
-    shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json", "--on", HOST_TARGET).stdout)
-    assert shown["refinement"]["adopted"]
+    recording, model = recording_of(run, rig_of(run), None)
+    answer = analysed(recording, model)
+    bare = replace(answer, model=recording_of(run, rig, None)[1])
+    assert not refined_in_c(identify_in_c(bare)).adopted
+    shown = refined_in_c(identify_in_c(answer))
+    assert shown.adopted
     friction = dry / STANDARD_PENDULUM.l1**2
     truth = {**simulated_rig("kapitza").truth, "f1": friction, "f2": friction, "slant": np.sin(0.02)}
     for name in ("w", "d1", "d2", "f1", "f2", "slant"):
-        one = shown["parameters"][name]
-        assert abs(one["value"] - truth[name]) < 3.5 * one["se_noise"], name
+        assert error_over_noise(shown, name, truth[name]) < 3.5, name
+    assert verify_recording(HOST_TARGET, rig_of(run), recording, ranking=answer.ranking, refined=True).equal
     board = MechanismBoard.of_guess(rig_of(run), refined=True)
     assert [name for name, _ in board.names.refined] == ["k1", "k2", "f1", "f2", "slant", "tau"]
     assert board_of(board.text()).equations.parameters == board.equations.parameters  # type: ignore[union-attr]
+
+
+def error_over_noise(answer: RefinedCoreAnswer, name: str, truth: float) -> float:
+    one = answer.values[name]
+    assert one.value is not None and one.se_noise is not None
+    return abs(one.value - truth) / one.se_noise
 
 
 def test_a_small_motion_with_dry_friction_is_refined_behind_the_long_windows_of_its_weak_form(tmp_path: Path) -> None:
@@ -266,12 +272,10 @@ def test_a_small_motion_with_dry_friction_is_refined_behind_the_long_windows_of_
         pvid("simulate", run, "--truth", "f1=0.0033", "--truth", "f2=0.0033", "--duration", "20").return_value == DONE
     )
     rig = MechanismRig("kapitza", 1000.0, known={"l1": 0.3}, refine={"dry_friction": True})
-    rig.write(run.with_suffix(".toml"))
-    shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
-    assert shown["refinement"]["adopted"] and shown["refinement"]["clash"] < 4.0
+    shown = refined_in_c(identify_in_c(analysed(*recording_of(run, rig, None))))
+    assert shown.adopted and shown.as_json()["refinement"]["clash"] < 4.0
     for name in ("w", "d1", "d2"):
-        one = shown["parameters"][name]
-        assert abs(one["value"] - simulated_rig("kapitza").truth[name]) < 3.5 * one["se_noise"], name
+        assert error_over_noise(shown, name, simulated_rig("kapitza").truth[name]) < 3.5, name
 
 
 def test_where_nothing_is_refined_the_answer_is_that_of_the_weak_form_and_says_so(
@@ -334,30 +338,26 @@ def test_without_a_compiler_there_is_one_sentence(
         pvid("identify", recorded["rigid_body"], "--core", "f32")
 
 
-def test_the_pendulum_s_own_rig_file_goes_through_the_identifier_and_the_refinement(tmp_path: Path) -> None:
-    """Columns, resolution, guess and gains come from the rig file."""
-    run = tmp_path / "run.csv"
-    assert pvid("simulate", run, "--duration", "15", "--seed", "2").return_value == DONE
-    weak = json.loads(pvid("identify", run, "--no-refine", "--json").stdout)
-    own = json.loads(pvid("identify", run, "--json").stdout)
+def test_the_physical_parameters_follow_from_the_weak_form_and_from_the_refinement(answers: Answers) -> None:
+    """Resolution, guess and gains come from the rig file."""
+    weak, own = answers("kapitza", "--no-refine"), answers("kapitza")
     assert weak["identified"] and weak["samples"] == own["samples"] == 15_000
-    assert "refinement" not in weak and own["refinement"]["adopted"]
+    assert "refinement" not in weak and own["refinement"]["adopted"] and "refined over" in own["refinement"]["text"]
     assert list(weak["parameters"]) == list(own["parameters"]) == ["g", "l2", "rho2", "w", "d1", "d2", "c"]
     for name, one in weak["parameters"].items():
         apart = abs(one["value"] - own["parameters"][name]["value"])
         assert apart < 3 * np.hypot(one["se"], own["parameters"][name]["se"]), name
+    for name, truth in simulated_rig("kapitza").truth.items():
+        one = own["parameters"][name]
+        assert abs(one["value"] - truth) < 3.5 * one["se_noise"], name
     # Small angles are neglected: the largest is about 0.1 rad.
     rough, sharp = weak["parameters"]["w"], own["parameters"]["w"]
     assert 0.003 < rough["se"] / rough["value"] < 0.02
-    assert sharp["se_noise"] < 0.1 * rough["se"]
-    assert pvid("compare", run).return_value == DONE
-    assert "window s" in pvid("tune", run).stdout
-    design = json.loads(pvid("design", "--run", run, "--json").stdout)
-    assert design["identified"] and set(design["parameters"]) == {"w", "d1", "d2", "c"}
+    assert sharp["se_noise"] < 0.1 * rough["se"] and sharp["se_noise"] < 1e-3 * sharp["value"]
 
 
-@pytest.mark.parametrize(("name", "tone"), [("kapitza", "0.006,1.1,0"), ("dc_motor", "4,1.5,0"), ("rigid_body", None)])
-def test_design_predicts_the_errors_of_a_rig_file_s_guess(name: str, tone: str | None, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "tone"), [("kapitza", "0.006,1.1,0"), ("dc_motor", "4,1.5,0")])
+def test_design_predicts_the_errors_of_a_rig_file_s_guess(name: str, tone: str, tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     known = {"l1": 0.25} if name == "kapitza" else {}
     MechanismRig(name, 1000.0, known=known).write(rig)
@@ -366,27 +366,31 @@ def test_design_predicts_the_errors_of_a_rig_file_s_guess(name: str, tone: str |
         found = json.loads(pvid("design", "--rig", rig, "--json", *arguments).stdout)
         return {name: one["se"] for name, one in found["parameters"].items()}
 
-    usual, short, long = errors(), errors("--duration", "10"), errors("--duration", "20")
+    short, long = errors("--duration", "10"), errors("--duration", "20")
     assert all(0 < long[name] < short[name] for name in long)
-    if tone is None:
-        with pytest.raises(PvidError, match="has 3 drives: --tone is for a mechanism with one"):
-            pvid("design", "--rig", rig, "--tone", "1,1,0")
-    else:
-        assert errors("--tone", tone) != usual
+    assert errors("--duration", "10", "--tone", tone) != short
     with pytest.raises(PvidError, match="positive number of seconds, not -1"):
         pvid("design", "--rig", rig, "--duration", "-1")
     with pytest.raises(PvidError, match="--run contains the drive"):
         pvid("design", "--rig", rig, "--run", "x.csv", "--duration", "3")
 
 
-def test_design_and_tune_show_the_identifier_s_design_for_a_recording(recorded: dict[str, Path]) -> None:
-    run = recorded["rigid_body"]
-    design = json.loads(pvid("design", "--model", "rigid_body", "--run", run, "--json").stdout)
-    core = json.loads(pvid("identify", run, "--core", "f32", "--json").stdout)
+def test_a_tone_is_for_a_mechanism_with_one_drive() -> None:
+    with pytest.raises(PvidError, match="has 3 drives: --tone is for a mechanism with one"):
+        pvid("design", "--model", "rigid_body", "--tone", "1,1,0")
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "kapitza"])
+def test_design_and_tune_show_the_identifier_s_design_for_a_recording(
+    name: str, recorded: dict[str, Path], answers: Answers
+) -> None:
+    run = recorded[name]
+    design = json.loads(pvid("design", "--model", name, "--run", run, "--json").stdout)
+    core = answers(name, "--core", "f32")
     assert design["identified"] and design["functions"] == core["functions"]
     assert design["window_s"] == pytest.approx(core["window_s"]) and design["decimation"] == core["decimation"]
-    for name, one in design["parameters"].items():
-        found = core["parameters"][name]
+    for parameter, one in design["parameters"].items():
+        found = core["parameters"][parameter]
         assert one["unit"] == found["unit"] and abs(one["value"] - found["value"]) < 5 * found["se"]
         assert 0.2 < one["se"] / found["se_noise"] < 5
     tuned = pvid("tune", run)

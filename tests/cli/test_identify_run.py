@@ -8,6 +8,7 @@ import subprocess
 import sys
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -50,11 +51,19 @@ def motor(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_simulated_run_is_identified_with_the_rig_file_beside_it(motor: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def shown(motor: Path) -> dict[str, Any]:
+    """What `identify --json` prints of it."""
+    answer: dict[str, Any] = json.loads(pvid("identify", motor, "--json").stdout)
+    return answer
+
+
+def test_a_simulated_run_is_identified_with_the_rig_file_beside_it(
+    motor: Path, shown: dict[str, Any], tmp_path: Path
+) -> None:
     figure = tmp_path / "figure.svg"
     answer = pvid("identify", motor, "--figure", figure)
     assert answer.return_value == DONE and "verdict good" in answer.stdout and figure.stat().st_size > 10_000
-    shown = json.loads(pvid("identify", motor, "--json").stdout)
     assert shown["identified"] and shown["model"] == "dc_motor" and set(shown["parameters"]) == set(TRUTH)
     for name, truth in TRUTH.items():
         one = shown["parameters"][name]
@@ -110,7 +119,7 @@ def test_long_work_is_shown_on_a_terminal(motor: Path, monkeypatch: pytest.Monke
     assert not elsewhere.getvalue()
 
 
-def test_columns_and_units_are_mapped(motor: Path, tmp_path: Path) -> None:
+def test_columns_and_units_are_mapped(motor: Path, shown: dict[str, Any], tmp_path: Path) -> None:
     lines = motor.read_text().splitlines()
     head, rows = lines[0].split(","), [line.split(",") for line in lines[1:]]
     assert head == ["t", "V", "i", "phi"]
@@ -120,16 +129,15 @@ def test_columns_and_units_are_mapped(motor: Path, tmp_path: Path) -> None:
     path.write_text("\n".join(renamed) + "\n", encoding="utf-8")
     columns = "t=time,V=drive,i=current_mA:mA,phi=angle"
     same = json.loads(pvid("identify", path, "--model", "dc_motor", "--columns", columns, "--json").stdout)
-    first = json.loads(pvid("identify", motor, "--json").stdout)
     for name in TRUTH:
-        assert same["parameters"][name]["value"] == pytest.approx(first["parameters"][name]["value"], rel=1e-6)
+        assert same["parameters"][name]["value"] == pytest.approx(shown["parameters"][name]["value"], rel=1e-6)
     with pytest.raises(PvidError, match=r"no column t \(s\) and V \(V\) and .*: use --columns t=time:s"):
         pvid("identify", path, "--model", "dc_motor")
 
 
-def test_settings_reach_the_model(motor: Path) -> None:
-    shown = json.loads(pvid("identify", motor, "--set", "sensor.i.resolution=0.5", "--json").stdout)
-    assert shown["chi2"] < json.loads(pvid("identify", motor, "--json").stdout)["chi2"]
+def test_settings_reach_the_model(motor: Path, shown: dict[str, Any]) -> None:
+    coarse = json.loads(pvid("identify", motor, "--set", "sensor.i.resolution=0.5", "--json").stdout)
+    assert coarse["chi2"] < shown["chi2"]
     with pytest.raises(PvidError, match="nominal.M: the model has no 'M'; it has R, L"):
         pvid("identify", motor, "--set", "nominal.M=3")
 
@@ -176,10 +184,10 @@ def test_advice_is_printed_and_part_of_the_json(motor: Path) -> None:
     assert json.loads(pvid("identify", motor, "--json").stdout)["advice"] == []
 
 
-def test_weights_are_chosen_and_reported(motor: Path) -> None:
-    shown = [json.loads(pvid("identify", motor, "--json", *more).stdout) for more in ((), ("--weights", "sensors"))]
-    assert [one["weights"] for one in shown] == ["residuals", "sensors"]
-    assert shown[1]["identified"]
+def test_weights_are_chosen_and_reported(motor: Path, shown: dict[str, Any]) -> None:
+    by_sensors = json.loads(pvid("identify", motor, "--json", "--weights", "sensors").stdout)
+    assert [one["weights"] for one in (shown, by_sensors)] == ["residuals", "sensors"]
+    assert by_sensors["identified"]
 
 
 def test_a_dead_sensor_is_named(motor: Path, tmp_path: Path) -> None:

@@ -36,6 +36,7 @@ Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
 
 TICKS = 400
+BY_DAY = ("kapitza", "battery_2rc", "two_mass_drive")  # of order two, of order one, and the longest
 GAP = 180  # a sample of the run that is no number
 FIVE = np.array([[0, 0], [8 / 12, -1 / 12], [16 / 12, -1 / 12], [-1, 0.5], [-4, 1]], np.float32)
 
@@ -167,7 +168,9 @@ def test_c_and_twin_have_the_same_bits(name: str, schedule: str) -> None:
     assert len(np.unique(want.p, axis=0)) > 10
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=() if one in BY_DAY else pytest.mark.night) for one in mechanisms.names()]
+)
 def test_the_printed_c_has_no_warning_and_its_header_is_cpp(name: str, tmp_path: Path) -> None:
     files = files_strong.files_of(strong_of(name), "test")
     for one, text in files.items():

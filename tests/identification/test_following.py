@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from own_mechanisms import OWN
 
 from pvid.cli.main import commands
 from pvid.codegen.refine import refine_functions
@@ -66,13 +67,14 @@ def test_the_refinement_forgets_alike() -> None:
     assert refine_settings(refine_functions(compiled), run, rate, p, 1.0).forgetting_s == 15.0
 
 
-@pytest.mark.parametrize("name", ["kapitza", "dc_motor"])
-def test_identify_notes_that_the_float64_analysis_does_not_forget(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(("model", "run_of"), [("dc_motor", "12"), (str(OWN["free_pendulum"].path), "7")])
+def test_identify_notes_that_the_float64_analysis_does_not_forget(tmp_path: Path, model: str, run_of: str) -> None:
     run, rig = tmp_path / "run.csv", tmp_path / "run.toml"
-    made = CliRunner().invoke(commands, ["model", "simulate", name, str(run), "--duration", "12"])
+    release = ["--start", "q=2.5", "--rate", "500"] if model != "dc_motor" else []
+    made = CliRunner().invoke(commands, ["model", "simulate", model, str(run), "--duration", run_of, *release])
     assert made.exit_code == 0, made.output
     rig.write_text(rig.read_text(encoding="utf-8") + "\n[identifier]\nforgetting_s = 20.0\n", encoding="utf-8")
     for core in ("f64", "f32"):
-        told = CliRunner().invoke(commands, ["identify", str(run), "--core", core, "--no-refine"])
+        told = CliRunner().invoke(commands, ["identify", str(run), "--model", model, "--core", core, "--no-refine"])
         assert told.exit_code == 0, told.output
         assert ("[identifier] has no effect" in told.stderr) == (core == "f64")

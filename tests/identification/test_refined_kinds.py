@@ -18,6 +18,7 @@ from pvid.codegen.refine import refine_functions
 from pvid.configuration.refine import refine_settings
 from pvid.configuration.weak import config_to_identify
 from pvid.identification.analysis import analysed
+from pvid.identification.answer import Analysis
 from pvid.identification.core import identify_in_c
 from pvid.identification.core_refined import BothStages, compare_refined, refined_in_c
 from pvid.identification.refinement.inputs import inputs_of
@@ -247,11 +248,18 @@ def coasted(n: int = 4000) -> tuple[Recording, dict[str, float]]:
     return recorded(0.02, F=F, v=read(v, 0.01, 5)), truth
 
 
-def test_friction_of_a_measured_speed_has_a_second_stage_in_c() -> None:
-    """Its jump is that at the reversal; the step there is as short as the speed's sensor needs, not its integral."""
+@pytest.fixture(scope="module")
+def coasted_through() -> tuple[Analysis, BothStages]:
+    """The analysis of the recording, and the settings of both stages."""
     recording, _ = coasted()
     answer = analysed(recording, coasting())
-    stages = BothStages.of(coasting(), recording, config_to_identify(coasting(), recording, answer.ranking))
+    weak = config_to_identify(answer.model, recording, answer.ranking)
+    return answer, BothStages.of(answer.model, recording, weak)
+
+
+def test_friction_of_a_measured_speed_has_a_second_stage_in_c(coasted_through: tuple[Analysis, BothStages]) -> None:
+    """Its jump is that at the reversal; the step there is as short as the speed's sensor needs, not its integral."""
+    answer, stages = coasted_through
     widths = stages.settings.width
     h = stages.settings.ratio / stages.settings.sample_rate
     assert widths is not None and stages.settings.fine_parts is not None
@@ -274,10 +282,10 @@ def test_a_reversal_against_a_moving_belt_is_where_the_speeds_are_equal() -> Non
     assert abs(float(settings.width[0]) / (2 * 2.0 / 1.0 * settings.ratio * 1e-3 / settings.fine_parts) - 1) < 0.01
 
 
-def test_a_configuration_that_the_core_refuses_is_named_with_its_value() -> None:
-    recording, _ = coasted()
-    answer = analysed(recording, coasting())
-    stages = BothStages.of(coasting(), recording, config_to_identify(coasting(), recording, answer.ranking))
+def test_a_configuration_that_the_core_refuses_is_named_with_its_value(
+    coasted_through: tuple[Analysis, BothStages],
+) -> None:
+    _, stages = coasted_through
     narrow = replace(stages.settings, width=np.array([1e-12], np.float32))
     with pytest.raises(PvidError, match=r"bad bounds: width is 1e-12 and must be 1e-09 to 1e\+09"):
         replace(stages, settings=narrow).run()

@@ -206,6 +206,8 @@ def test_perfect_rig_lacks_nothing(name: str) -> None:
     found = imperfect(name)
     assert found.lacking is not None and not found.lacking.visible.any()
     assert found.verdict.status == "good"
+    of_samples = {"clipped", "resting", "rate", "guesses", "unchecked"}
+    assert not of_samples & {one.name for one in found.verdict.reasons}
 
 
 LSB = 2 * np.pi / 2**12

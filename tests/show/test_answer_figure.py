@@ -17,6 +17,7 @@ from pvid.show.axis_limits import plain_ticks
 
 MOTOR = "dc_motor"
 SECONDS = {"kapitza": "20", "battery_2rc": "7200", "rigid_body": "10"}  # the others: 8
+BY_DAY = ("kapitza", "battery_2rc", "rigid_body")  # and the motor, in the other tests
 
 
 def run_pvid(*words: str | Path) -> Result:
@@ -65,7 +66,9 @@ def test_plot_takes_a_model_file_and_the_refinement(motor: Path, tmp_path: Path)
     assert rms is not None and float(rms[1]) < 2e-3  # the encoder's step is 2 pi / 4096, 1.5e-3 rad
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in BY_DAY else pytest.mark.night) for name in names()]
+)
 def test_plot_draws_every_shipped_mechanism(name: str, tmp_path: Path) -> None:
     """The rig file beside the run names the mechanism; no option is needed."""
     run = tmp_path / "run.csv"
