@@ -15,6 +15,7 @@ import pyarrow.parquet
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT
+from own_mechanisms import OWN, own_recording
 from pendulum_plant import simulate, standard_sensors
 from program import pvid
 
@@ -114,24 +115,24 @@ def test_the_workers_of_a_running_scheduler_do_the_work(runs: Path, tmp_path: Pa
     assert "line 2, column y" in (row.failure or "")
 
 
-def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(
-    runs: Path, tmp_path: Path, inline: list[str]
-) -> None:
-    paths = []
-    for name in ("a", "b"):
-        paths.append(str(tmp_path / f"{name}.npz"))
-        shutil.copy(runs / name / "run.npz", paths[-1])
+def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(tmp_path: Path, inline: list[str]) -> None:
+    """Of a model file of one's own."""
+    recording, question = own_recording("heated_plate"), Question(model=str(OWN["heated_plate"].path))
+    paths = [str(tmp_path / "a.npz"), str(tmp_path / "b.npz")]
+    for path, first in zip(paths, (0, 100), strict=True):
+        np.savez(path, t=recording.t[first:], P=recording.signals["P"][first:], T=recording.signals["T"][first:])
     out = tmp_path / "fleet.parquet"
     store = Store(out)
-    store.add(row_of(paths[0], asked()))
+    store.add(row_of(paths[0], question))
     with store.partial.open("ab") as file:
         file.write(b'\n{"key": "cut o')
-    found = fleet.run(paths, asked(), Store(out), lambda _: None)
+    found = fleet.run(paths, question, Store(out), lambda _: None)
     assert inline == paths[1:] and [row.path for row in found] == paths and found == read_rows(out)
-    shutil.copy(runs / "b" / "run.npz", paths[0])
-    fleet.run(paths, asked(), Store(out), lambda _: None)
+    assert all(row.failure is None for row in found)
+    shutil.copy(paths[1], paths[0])
+    fleet.run(paths, question, Store(out), lambda _: None)
     assert inline == [paths[1], paths[0]]
-    fleet.run(paths, asked(core="q31"), Store(out), lambda _: None)
+    fleet.run(paths, replace(question, core="q31"), Store(out), lambda _: None)
     assert inline[2:] == paths
 
 
