@@ -154,6 +154,7 @@ def test_where_residuals_are_noise_blocks_grow() -> None:
 def test_a_refinement_ends_where_its_budget_is_spent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without it a stiff guess of a long recording takes half an hour."""
     monkeypatch.setattr(refined_problems, "_WORK", 10)
+    monkeypatch.setattr(refined_problems, "_WORK_BEYOND", 10)
     answer, _, text = refined_answer(answer_of("kapitza", lacking=("w", "d1", "d2", "c")))
     assert TOO_LONG in text and all(one.value is None or one.se is not None for one in answer.values.values())
 
