@@ -118,8 +118,8 @@ ready = Recent(Compiled)  # a model with its functions
 
 
 # Of the work that is allowed to the search for a design: that of the rest where it finds a plausible estimate, terms
-# that are missing included, and where it finds none.
-_OF_KNOWN, _OF_UNKNOWN = 5.0, 0.5
+# that are missing included, where it finds none, and where the equations explain nothing of a row.
+_OF_KNOWN, _OF_UNKNOWN, _OF_HOPELESS = 5.0, 0.5, 0.1
 
 
 def allowance_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> float:
@@ -173,7 +173,8 @@ def identify(
         units = allowance_of(compiled, run, sample_rate)
         with work.limited(units):
             ranking = tuple(ranked(model, run, sample_rate, begun, with_error))
-        with work.limited((_OF_KNOWN if ranking[0].known else _OF_UNKNOWN) * units):
+        share = _OF_HOPELESS if ranking[0].is_hopeless else _OF_KNOWN if ranking[0].known else _OF_UNKNOWN
+        with work.limited(share * units):
             return _judged(compiled, run, ranking[0].design, begun, ranking[0].p, compensate, with_error, ranking)
     return _judged(compiled, run, design, begun, None, compensate, with_error)
 
