@@ -112,3 +112,11 @@ def test_a_unit_does_not_end_a_comment_of_c(text: str) -> None:
 def test_powers_are_fractions_too() -> None:
     assert dimension_of_unit("m^(5/2)/s") * dimension_of_unit("1/m^(1/2)") == dimension_of_unit("m^2/s")
     assert dimension_of_unit("V/(A^2*s)") == dimension_of_unit("V/A^2/s") == dimension_of_unit("V A^-2 s^-1")
+    assert dimension_of_unit("V/(A*s)^2") == dimension_of_unit("V/(A^2*s^2)") == dimension_of_unit("V/A^2/s^2")
+    assert dimension_of_unit("kg*(m/s)^2") == dimension_of_unit("J") == dimension_of_unit("((N))*m")
+
+
+@pytest.mark.parametrize("text", ["10", "2*m", "(m", "m)", "()", "m^", "m^(1/0)", "(m)(s)"])
+def test_what_is_no_product_of_powers_is_no_unit(text: str) -> None:
+    with pytest.raises(PvidError, match="no unit"):
+        dimension_of_unit(text)

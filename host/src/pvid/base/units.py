@@ -114,8 +114,9 @@ _WORDS = {
     "": "1 - count counts dimensionless none unitless",
 }
 _SYMBOL_OF = {word: symbol for symbol, words in _WORDS.items() for word in words.split()}
-_DIVIDED = str.maketrans("*/ .", "/*//")
-_FACTOR = re.compile(r"(?P<of>[A-Za-z_%]+)(?:\^?(?P<power>[+-]?\d+(?:\|\d+)?))?|1")
+_SIGNS = ("*", "/", " ", ".")
+_NAME = re.compile(r"[A-Za-z_%]+|1(?!\d)")
+_POWER = re.compile(r"\^?([+-]?\d+)|\^\(([+-]?\d+/[1-9]\d*)\)")
 # Of a signal in an SI unit, what a refusal proposes.
 _USUAL = {
     "s": ("s", "ms", "us", "ns", "min", "h"),
@@ -187,26 +188,35 @@ def spelled(text: str) -> str:
 
 @functools.cache
 def unit_of(text: str) -> Unit | None:
-    """A product of powers; None where it is none. What is behind a / up to the next * or blank divides, or what is in
-    brackets behind it."""
-    if text == "":
-        return _ONE
-    if len(text) > 1 and re.search(r"[*/]([*/]|$)", text):
+    """A product of powers, with brackets; None where it is none. A / divides by the next factor alone."""
+    text = " ".join(re.sub(r"\s*([*/])\s*", r"\1", text).split())
+    found = _product(text, 0) if text else (_ONE, 0)
+    return found[0] if found is not None and found[1] == len(text) else None
+
+
+def _product(text: str, at: int) -> tuple[Unit, int] | None:
+    """From a place in a text on; with the place behind it."""
+    left = _factor(text, at)
+    while left is not None and text[left[1] : left[1] + 1] in _SIGNS:
+        sign = text[left[1]]
+        right = _factor(text, left[1] + 1)
+        left = None if right is None else (left[0].times(right[0], -1 if sign == "/" else 1), right[1])
+    return left
+
+
+def _factor(text: str, at: int) -> tuple[Unit, int] | None:
+    """Likewise: a symbol, 1 or a product in brackets, to a power."""
+    name = _NAME.match(text, at)
+    if name is not None:
+        one, end = _symbol(name[0]), name.end()
+    elif text[at : at + 1] == "(" and (inner := _product(text, at + 1)) is not None and text[inner[1] :][:1] == ")":
+        one, end = inner[0], inner[1] + 1
+    else:
         return None
-    found, power = _ONE, 1
-    text = re.sub(r"\^\(([+-]?\d+)/(\d+)\)", r"^\1|\2", text)  # m^(1/2)
-    text = re.sub(r"/\(([^()]*)\)", lambda inner: "/" + inner[1].translate(_DIVIDED), text.replace(" / ", "/"))
-    for sign, part in re.findall(r"(^|[*/ .])([^*/ .]*)", text.replace(" * ", "*")):
-        if not part:
-            continue
-        part = part.strip("()")
-        power = -1 if sign == "/" else 1
-        match = _FACTOR.fullmatch(part)
-        one = None if match is None else _symbol(match["of"] or "1")
-        if match is None or one is None:
-            return None
-        found = found.times(one, power * Fraction((match["power"] or "1").replace("|", "/")))
-    return found
+    power = _POWER.match(text, end)
+    if one is None or power is None:
+        return None if one is None else (one, end)
+    return one.times(one, Fraction(power[1] or power[2]) - 1), power.end()
 
 
 def _symbol(text: str) -> Unit | None:
