@@ -213,10 +213,10 @@ def _factor(text: str, at: int) -> tuple[Unit, int] | None:
         one, end = inner[0], inner[1] + 1
     else:
         return None
+    if one is None:
+        return None
     power = _POWER.match(text, end)
-    if one is None or power is None:
-        return None if one is None else (one, end)
-    return one.times(one, Fraction(power[1] or power[2]) - 1), power.end()
+    return (one, end) if power is None else (_ONE.times(one, Fraction(power[1] or power[2])), power.end())
 
 
 def _symbol(text: str) -> Unit | None:

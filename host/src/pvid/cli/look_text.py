@@ -73,10 +73,5 @@ def _advice(survey: Survey) -> list[str]:
 def _constants(one: Proposal) -> list[str]:
     if not one.constants:
         return []
-    wanted = ", ".join(with_unit_of(name, unit) for name, unit in one.constants)
+    wanted = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in one.constants)
     return [f"    with your own {wanted} in place of 0.00"]
-
-
-def with_unit_of(name: str, unit: str) -> str:
-    """`l1 [m]`."""
-    return f"{name} [{unit}]" if unit else name

@@ -147,9 +147,9 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """As of click, which proposes names of commands that it holds; these are imported when they are used."""
-        name = args[0]
-        if not name.startswith("-") and self.get_command(ctx, name) is None and not ctx.resilient_parsing:
-            near = get_close_matches(name, self.list_commands(ctx), n=1, cutoff=0.5)
+        name, present = args[0], self.list_commands(ctx)
+        if not name.startswith("-") and name not in present and not ctx.resilient_parsing:
+            near = get_close_matches(name, present, n=1, cutoff=0.5)
             ctx.fail(f"there is no command {shown(name)}" + (f": did you mean {near[0]}?" if near else ""))
         return super().resolve_command(ctx, args)
 

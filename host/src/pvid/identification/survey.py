@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.units import Scale, scale_to, spelled
-from pvid.identification.wild_samples import far_from_median
+from pvid.identification.wild_samples import MOST_FAR, far_from_median
 from pvid.models.mechanisms import described
 from pvid.models.registry import names as shipped_names
 from pvid.rig.columns import TIME, Channel, Column, Columns, MissingColumnError, unit_in, unit_in_brackets
@@ -36,29 +36,11 @@ _AT_THE_END = 0.98  # share of the other stretches of equal samples, in which a 
 _IRREGULAR = 0.3  # scatter of the blank stretches, of their mean
 _EVEN = 0.1  # scatter of the steps from row to row, of their mean
 _BLANK = 0.9  # share of the rows in which what is set is blank
-_MOST_FAR = 0.05  # of the samples: more are no exceptions
 _EPOCH = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))  # of seconds they are 1.7e9 now
 _OF_MOTION = 0.99  # share of a signal's power
 _SPECTRUM = 1 << 17  # samples
 _SI = ("rad", "m", "s", "rad/s", "m/s", "V", "A", "N", "N*m", "K", "Hz", "W", "Pa", "kg", "m/s^2", "rad/s^2")
-_CONFLICTING = (
-    "m",
-    "s",
-    "a",
-    "k",
-    "n",
-    "v",
-    "h",
-    "g",
-    "c",
-    "w",
-    "j",
-    "t",
-    "f",
-    "l",
-    "in",
-    "min",
-)  # also words of names
+_CONFLICTING = frozenset("m s a k n v h g c w j t f l in min".split())  # also words of names
 
 
 @dataclass(frozen=True)
@@ -110,19 +92,16 @@ class Survey:
     facts: tuple[ColumnFacts, ...]
 
 
+@dataclass(frozen=True)
 class _AsWritten(Columns):
-    """Columns whose numbers are left as they are, and that note the units which the file states."""
+    """Columns whose numbers are left as they are, and that note the units which the file states, by signal."""
+
+    stated: dict[str, str] = field(default_factory=dict)
 
     def in_units_of_file(self, units: Mapping[str, str]) -> tuple[Columns, tuple[str, ...]]:
         """See Columns; of the time as there."""
         self.stated.update({signal: spelled(unit) for signal, unit in units.items() if unit.strip()})
         return super().in_units_of_file({"t": units["t"]} if "t" in units else {})
-
-    @property
-    def stated(self) -> dict[str, str]:
-        """By signal."""
-        found: dict[str, str] = self.__dict__.setdefault("_stated", {})
-        return found
 
 
 def surveyed(path: str | os.PathLike[str]) -> Survey:
@@ -165,9 +144,9 @@ def names_in(path: Path) -> tuple[str, ...]:
 
 def unit_of_name(name: str) -> str:
     """The unit at the end of a column's name, where it is one beyond doubt: `angle_deg`, `h (mm)`; else ""."""
+    in_brackets = name.rstrip().endswith((")", "]"))
     for si in _SI:
         found = unit_in(name, si)
-        in_brackets = name.rstrip().endswith((")", "]"))
         if found is not None and (in_brackets or found.lower() not in _CONFLICTING):
             return found
     return ""
@@ -273,10 +252,11 @@ def _facts_of(name: str, unit: str, written: Float, recording: Recording, key: s
         remarks.append(f"a counter: it starts over after {counter.modulus:.10g}")
         signal, x = counter.values, counter.values[np.isfinite(counter.values)]
     blank = 1 - len(x) / len(written)
-    changes = np.flatnonzero(np.diff(x))
-    if np.ptp(np.diff(x)) < _EVEN * abs(np.diff(x).mean()):
+    steps = np.diff(x)
+    if np.ptp(steps) < _EVEN * abs(steps.mean()):
         even = ("rises evenly: a counter or a clock",)
-        return ColumnFacts(key, name, unit, low, high, float(np.diff(x).mean()), None, even, is_even=True)
+        return ColumnFacts(key, name, unit, low, high, float(steps.mean()), None, even, is_even=True)
+    changes = np.flatnonzero(steps)
     levels = len(np.unique(x))
     stays = np.median(np.diff(changes, append=len(x)))
     is_set = blank > _BLANK or (len(changes) < _HELD_SHARE * len(x) and stays >= _HELD_SAMPLES)
@@ -286,7 +266,7 @@ def _facts_of(name: str, unit: str, written: Float, recording: Recording, key: s
         return ColumnFacts(key, name, unit, low, high, None, None, tuple(remarks), is_set=True)
     there = signal[np.isfinite(signal)]
     far = far_from_median(there, 0.0)
-    if far.any() and far.mean() < _MOST_FAR:
+    if far.any() and far.mean() < MOST_FAR:
         values, times = np.unique(there[far], return_counts=True)
         usual = f"{values[np.argmax(times)]:.6g} {unit}".rstrip()
         remarks.append(f"{far.sum()} samples are far from those about them, most often {usual}")
@@ -385,7 +365,7 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
         written = typed(survey.names, survey.names.index(name))
         in_si = not unit or scale_to(units[signal], unit) == Scale()
         if name != signal or not in_si:
-            parts.append(f"{signal}={written}" + ("" if in_si or _is_stated_apart(name) else f":{unit}"))
+            parts.append(f"{signal}={written}" + ("" if in_si or unit_in_brackets(name) else f":{unit}"))
     constants = tuple((one.name, one.unit) for one in description.knowns if one.required)
     columns = ",".join(parts)
     return Proposal(mechanism, description.title, shlex.quote(columns) if columns else "", constants, len(own))
@@ -394,11 +374,6 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
 def _fits(unit: str | None, si: str) -> bool:
     """Whether a column that states this unit can be a signal in an SI unit."""
     return not unit or scale_to(si, unit) is not None
-
-
-def _is_stated_apart(name: str) -> bool:
-    """Whether the reader finds the unit by itself: in brackets."""
-    return bool(unit_in_brackets(name))
 
 
 def lines_of_a_model(survey: Survey) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ _MEDIAN_OF, _FAR, _RUN, _NEIGHBOUR = 11, 10.0, 3, 0.2
 # An error code: so many samples in a row, so often where both neighbours agree, while no input moves by so much of its
 # range.
 _CODES, _FEWEST_CODES, _STEADY = 8, 4, 0.05
-_MOST_FAR = 0.05  # of the samples: with more, the recording is refused
+MOST_FAR = 0.05  # of the samples: with more, the recording is refused
 
 
 def far_from_median(x: Float, sd: float) -> Mask:
@@ -93,7 +93,7 @@ def _without_far_samples(recording: Recording, signal: Signal, find: Callable[[F
         return x, ""
     values, times = np.unique(x[far], return_counts=True)
     usual = f"{values[np.argmax(times)]:g} {signal.unit}".rstrip()
-    if count > _MOST_FAR * np.count_nonzero(there):
+    if count > MOST_FAR * np.count_nonzero(there):
         raise PvidError(
             f"{signal.name} is far from the samples about it in {count} of {len(x)} samples, most often {usual}: an "
             "error code of the sensor, or a loose contact?"

@@ -208,19 +208,13 @@ class Columns:
             found = ", ".join(shown(name, 24) for name in names[:8]) + (", ..." if len(names) > 8 else "")
             raise MissingColumnError(
                 f"{path}{where}: no column {wanted} among {found or 'none'}: "
-                f"use --columns {self.suggestion(names, places)}.",
+                f"use --columns {self._suggestion(names, places)}.",
                 tuple(names),
             )
         return places
 
-    def suggestion(self, names: Sequence[str], places: Mapping[str, int]) -> str:
-        """The text for --columns that is likely to be meant; a signal whose column cannot be guessed is NAME.
-
-        Parameters
-        ----------
-        names : of the columns of a file
-        places : of the signals that have been found among them
-        """
+    def _suggestion(self, names: Sequence[str], places: Mapping[str, int]) -> str:
+        """The text for --columns that is likely to be meant; a signal whose column cannot be guessed is NAME."""
         taken = set(places.values())
         parts = []
         numbered = list(names) == [str(k + 1) for k in range(len(names))]  # the file has no names
