@@ -60,6 +60,17 @@ def test_code_that_does_not_compile_is_one_sentence() -> None:
         model_library.model_library("tiny", texts("2.0f +"), {})
 
 
+def test_nothing_is_kept_of_a_core_that_is_edited_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every tree with the sources of before would get it."""
+    folder = model_library._kept()
+    kept = set(folder.iterdir()) if folder.exists() else set()
+    hashes = iter(["before", "after"])
+    monkeypatch.setattr(model_library, "_core_hash", lambda: next(hashes))
+    with pytest.raises(PvidError, match="have changed while they were compiled: start again"):
+        model_library.model_library("tiny", texts("4.0f"), {})
+    assert {one for one in folder.iterdir() if not one.name.startswith(".")} <= kept
+
+
 def test_without_a_compiler_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)

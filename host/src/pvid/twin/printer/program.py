@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -69,21 +69,29 @@ def printed_module(
     texts: Mapping[str, str] | None = None,
 ) -> ModuleType:
     """The printed module, loaded; as `text_of`. Its text stays in the cache of builds."""
-    every = [*sources, *(one for folder in folders for one in sorted(folder.glob("**/*.h")))]
-    printer = sorted(Path(__file__).parent.glob("*.py"))
-    key = hashlib.sha256(repr((sorted(macros.items()), list(roots), sorted((texts or {}).items()))).encode())
-    for one in [*every, *printer]:
-        key.update(one.name.encode() + b"\0" + one.read_bytes())
-    place = cache_folder() / "twins" / f"{key.hexdigest()[:24]}.py"
+    made_from = repr((_PRINTER, sorted(macros.items()), list(roots), sorted((texts or {}).items())))
+    key = _hash_of(sources, folders, made_from)
+    place = cache_folder() / "twins" / f"{key[:24]}.py"
     text = ""
     with suppress(OSError):
         text = place.read_text(encoding="utf-8")
     if not text:
         text = text_of(sources, folders, macros, roots, texts)
-        with suppress(OSError):
-            place.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(place, text, freely=True)
+        if _hash_of(sources, folders, made_from) == key:  # nobody has edited them meanwhile
+            with suppress(OSError):
+                place.parent.mkdir(parents=True, exist_ok=True)
+                write_whole(place, text, freely=True)
     return loaded(text, str(place))
+
+
+def _hash_of(sources: Iterable[Path], folders: Iterable[Path], more: str) -> str:
+    whole = hashlib.sha256(more.encode())
+    for one in [*sources, *(one for folder in folders for one in sorted(folder.glob("**/*.h")))]:
+        whole.update(one.name.encode() + b"\0" + one.read_bytes())
+    return whole.hexdigest()
+
+
+_PRINTER = _hash_of(sorted(Path(__file__).parent.glob("*.py")), [], "")  # as this process has it
 
 
 @cache
