@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints what the host has from the public C headers: the enumerations as host/src/pvid/settings/enums.py, the settings
-of the estimator and of what judges it as host/src/pvid/settings/parts.py; and texts for firmware/src/judge/text.c and
-host/docs/reasons.md; and the version. --check: only compares.
+of the estimator and of what judges it as host/src/pvid/settings/parts.py; the texts of firmware/src/judge/text.c; and the
+version. --check: only compares.
 
 Run it with build/venv/bin/python after a change of the headers, when ./tools/pvid has built the C core.
 """
@@ -18,7 +18,6 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "host" / "src"))
-from pvid.cli.page_table import markdown, with_table  # noqa: E402
 from pvid.core.headers import Headers  # noqa: E402
 from pvid.core.native import Native  # noqa: E402
 
@@ -28,7 +27,6 @@ PARTS = FILE.with_name("parts.py")
 VERSION = ROOT / "firmware" / "include" / "pvid" / "version.h"
 MODULE = ROOT / "host" / "src" / "pvid" / "base" / "version.py"
 CITATION = ROOT / ".github" / "CITATION.cff"
-PAGE = ROOT / "host" / "docs" / "reasons.md"
 STATUS = ROOT / "firmware" / "include" / "pvid" / "status.h"
 ENUMS = {
     "Reason": ("pvid_reason", "Outcome of a tick"),
@@ -191,14 +189,6 @@ def parts(native: Native) -> str:
     return "\n".join(classes)
 
 
-def statuses(headers: Headers) -> str:
-    """The table of statuses of the page."""
-    about = comments(STATUS.read_text(encoding="utf-8"))
-    return markdown(
-        ("status", "refused because"), [(f"`{one}`", about[one]) for one in headers.enum("pvid_status") if one in about]
-    )
-
-
 def version() -> str:
     """That of version.h."""
     return ".".join(re.findall(r"#define PVID_VERSION_\w+ (\d+)", VERSION.read_text(encoding="utf-8")))
@@ -210,10 +200,9 @@ def main() -> None:
     native = Native()
     headers = native.headers
     only_check = parser.parse_args().check
-    page = with_table(PAGE, "statuses", statuses(headers))
     module = f'"""The version, printed by tools/print_headers.py from version.h."""\n\n__version__ = "{version()}"\n'
     citation = re.sub(r"(?m)^version: .*$", f"version: {version()}", CITATION.read_text(encoding="utf-8"))
-    made = {FILE: printed(headers), PARTS: parts(native), TEXTS: texts(headers), PAGE: page}
+    made = {FILE: printed(headers), PARTS: parts(native), TEXTS: texts(headers)}
     for file, text in (made | {MODULE: module, CITATION: citation}).items():
         if not only_check:
             file.write_text(text, encoding="utf-8")

@@ -48,11 +48,11 @@ def blocks(page: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The README's, with the files that its command writes for the standard rig."""
+    """The first of firmware.md, with the files that its command writes for the standard rig."""
     folder = tmp_path_factory.mktemp("program")
-    (folder / "example.c").write_text(blocks(README)[0], encoding="utf-8")
+    (folder / "example.c").write_text(blocks(FIRMWARE)[0], encoding="utf-8")
     MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(folder / "rig.toml")
-    written = re.search(r"/\* \./tools/pvid (model build .*) -o kapitza \*/", text_of(README))
+    written = re.search(r"/\* \./tools/pvid (model build .*) -o kapitza \*/", text_of(FIRMWARE))
     assert written is not None
     command = [sys.executable, "-P", "-m", "pvid", *written[1].split(), "-o", "kapitza"]
     subprocess.run(command, cwd=folder, capture_output=True, check=True)
@@ -92,14 +92,14 @@ def compile_as_cpp(source: str, standard: str, folder: Path) -> None:
 
 @pytest.mark.parametrize("standard", ["c++14", "c++20"])
 def test_program_is_cpp_too(standard: str, tmp_path: Path) -> None:
-    compile_as_cpp(blocks(README)[0], standard, tmp_path)
+    compile_as_cpp(blocks(FIRMWARE)[0], standard, tmp_path)
 
 
 def test_examples_of_both_stages_and_of_an_interrupt_compile(tmp_path: Path) -> None:
     stubs = (
         '#include "pvid/pvid.h"\nfloat read_encoder();\nfloat read_pivot();\nvoid show(const pvid_estimate_f32 *);\n'
     )
-    both, interrupt = blocks(FIRMWARE)[:2]
+    _, both, interrupt = blocks(FIRMWARE)
     compile_as_cpp(stubs + interrupt, "c++20", tmp_path)
     settings = (
         '#include "pvid/refine.h"\n#include "kapitza_design_f32.h"\n'
@@ -150,7 +150,7 @@ def enumerators(header: str, enumeration: str) -> list[str]:
 
 @pytest.mark.parametrize(
     ("header", "enumeration"),
-    [("status.h", "pvid_status"), ("status.h", "pvid_reason"), ("snapshot_slots.h", "pvid_snapshot_status")],
+    [("status.h", "pvid_reason"), ("snapshot_slots.h", "pvid_snapshot_status")],
 )
 def test_every_enumerator_has_its_remedy(header: str, enumeration: str) -> None:
     text = text_of(DOCS / "reasons.md")
@@ -224,24 +224,23 @@ def test_sources_cite_pages_that_exist() -> None:
     assert wrong == []
 
 
-# ---- figures of the README
+# ---- figures
 
 
-def test_the_costs_of_the_readme_are_what_its_command_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_costs_are_what_their_command_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the budget, with which tests/board/test_targets.py compares what is measured."""
     budget = sizes.budgeted(ROOT / "tests" / "budget.toml")
     monkeypatch.setattr(sizes, "measure", lambda one: (budget[one], None))
     page = tmp_path / "README.md"
-    page.write_text(re.sub(r"\| \d+ / \d+ \| \d+", "| 1 / 2 | 3", text_of(README)), encoding="utf-8")
+    page.write_text(re.sub(r"\| \d+ / \d+ \| \d+", "| 1 / 2 | 3", text_of(FIRMWARE)), encoding="utf-8")
     assert text_of(page).count("| 1 / 2 | 3") == 6
     CliRunner().invoke(commands, ["sizes", "--update", str(page)], standalone_mode=False, catch_exceptions=False)
-    assert text_of(page) == text_of(README), "./tools/pvid sizes --update README.md"
+    assert text_of(page) == text_of(FIRMWARE), "./tools/pvid sizes --update host/docs/firmware.md"
 
 
 def test_readme_is_short_and_begins_with_what_a_reader_runs() -> None:
     text = text_of(README)
-    shown = re.sub(r"(?ms)^```.*?^```|^\|.*?$|^ {4}.*?$", "", text)
-    assert len(shown.split()) <= 800
-    order = ["./tools/pvid demo", "pvid identify", "import pvid", "model check", "```c"]
+    assert len(text.split()) <= 700
+    order = ["./tools/pvid demo", "pvid look", "pvid identify recorded", "import pvid", "model check", "pvid deploy"]
     places = [text.index(one) for one in order]
     assert places == sorted(places) and text[: places[0]].count("\n") < 20

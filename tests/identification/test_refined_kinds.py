@@ -290,7 +290,7 @@ def test_a_configuration_that_the_core_refuses_is_named_with_its_value(
     with pytest.raises(PvidError, match=r"bad bounds: width is 1e-12 and must be 1e-09 to 1e\+09"):
         replace(stages, settings=narrow).run()
     several = replace(stages.settings, first_block=200)
-    with pytest.raises(PvidError, match=r"bad window \(host/docs/reasons.md has its fields and their ranges\)"):
+    with pytest.raises(PvidError, match=r"bad window \(pvid/status.h has its fields and their ranges\)"):
         replace(stages, settings=several).run()
 
 

@@ -69,7 +69,8 @@ def run_once(line: str, folder: Path, full: bool, known: dict[tuple[str, ...], p
 
 def compile_c(block: pages.Block, folder: Path) -> None:
     """Syntax and types, with the headers that the page's commands have written."""
-    (folder / "page.c").write_text(SURROUNDINGS.get(block.page.name, "") + block.text, encoding="utf-8")
+    around = SURROUNDINGS.get(block.page.name, "") if "#include <" not in block.text else ""  # a whole program has its own
+    (folder / "page.c").write_text(around + block.text, encoding="utf-8")
     generated = sorted({path.parent for path in folder.rglob("*_design_f32.h")})
     sizes: dict[str, int] = {}
     for path in folder.rglob("*_design_f32.h"):
@@ -124,7 +125,7 @@ def test_every_block_of_a_page_is_executed(
                 assert block.text == path_of(page.stem)[1].read_text(encoding="utf-8").rstrip()
             case "python":
                 printed = pages.executed_python(block, folder, names).text
-            case "c" if page.name != "README.md":  # tests/cli/test_readme.py builds and executes that program
+            case "c":
                 compile_c(block, folder)
             case "toml":
                 MechanismRig.parse(block.text)

@@ -43,7 +43,7 @@ def command(
     """Measures flash, RAM, stack and instructions per tick, built and run in an emulator: on every board, or on those
     named as TARGET.
 
-    --update README.md measures what the rows of its table `costs` name, and replaces their figures.
+    --update host/docs/firmware.md measures what the rows of its table `costs` name, and replaces their figures.
     """
     from pvid.board import boards, sizes
 

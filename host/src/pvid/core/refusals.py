@@ -67,7 +67,7 @@ def refused(status: Status, *configs: Any, in_counts: bool = False) -> str:
     known = "; ".join(
         f"{name} is {', '.join(f'{one:.4g}' for one in values)}" for name, values in given.items() if values
     )
-    return f"{text} (host/docs/reasons.md has its fields and their ranges){': ' + known if known else ''}"
+    return f"{text} (pvid/status.h has its fields and their ranges){': ' + known if known else ''}"
 
 
 def _values(name: str, settings: Any) -> Iterator[float]:
