@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -48,10 +48,11 @@ OWN = {
 
 
 @cache
-def own_recording(name: str) -> Recording:
-    """TICKS samples of a simulated rig of the guess."""
+def own_recording(name: str, **factors: float) -> Recording:
+    """TICKS samples of a simulated rig of the guess, some of its parameters so many times as large."""
     own = OWN[name]
     length = TICKS / own.rate
     rig = rig_of_guess(own.compiled, "steps", *own.band, rate=own.rate, duration=length, start=own.start)
+    rig = replace(rig, truth={one: factors.get(one, 1.0) * value for one, value in rig.truth.items()})
     run = RigSimulation.of(own.compiled, rig).run()
     return Recording(run.pop("t"), run, own.rate)

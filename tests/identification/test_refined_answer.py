@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from own_mechanisms import own_recording
 from refinements import (
     ISOLATED,
     answer_of,
@@ -48,7 +51,13 @@ def unknown(name: str, recording: Recording | None = None) -> Analysis:
 
 
 # Mechanisms by what they may have beside their parameters.
-EXTRAS = {"kapitza": {"k1", "k2", "tau"}, "isolator": {"tau"}, "heated_plate": set[str](), "free_pendulum": set[str]()}
+EXTRAS = {
+    "kapitza": {"k1", "k2", "tau"},
+    "isolator": {"tau"},
+    "heated_plate": set[str](),
+    "free_pendulum": set[str](),
+    "dc_motor": set[str](),
+}
 
 
 @pytest.mark.parametrize(
@@ -105,15 +114,37 @@ def test_where_the_weak_form_has_no_answer_residuals_above_noise_give_one_with_a
     assert (np.diag(found.covariance)[main] > 1.5**2 * np.diag(found.noise)[main]).all()
 
 
-@pytest.mark.parametrize(("name", "factor"), [("k", 1.002), ("c", 1.02)])
-def test_a_recording_whose_halves_differ_has_no_answer(name: str, factor: float) -> None:
-    """A parameter of the second half is larger, and the residuals do not show by how much."""
-    run, other = run_of("isolator"), isolator_run(of={**ISOLATED, name: factor * ISOLATED[name]}).signals
+def _isolator(name: str, factor: float) -> Recording:
+    return isolator_run(of={**ISOLATED, name: factor * ISOLATED[name]})
+
+
+@pytest.mark.parametrize(
+    ("of", "other"),
+    [
+        ("isolator", partial(_isolator, "k", 1.002)),
+        ("isolator", partial(_isolator, "c", 1.02)),
+        ("heated_plate", partial(own_recording, "heated_plate", h=1.02)),
+        ("heated_plate", partial(own_recording, "heated_plate", C=1.01)),
+    ],
+)
+def test_a_recording_whose_halves_differ_has_no_answer(of: str, other: Callable[[], Recording]) -> None:
+    """A parameter of the second half is larger, and the residuals do not show by how much, or are noise."""
+    run, signals = run_of(of), other().signals
     half, lost = len(run) // 2, np.full(10, np.nan)
-    joined = {one: np.r_[x[: half - 5], lost, other[one][half + 5 :]] for one, x in run.signals.items()}
-    answer, refined, text = refined_answer(unknown("isolator", changed(run, **joined)))
+    joined = {one: np.r_[x[: half - 5], lost, signals[one][half + 5 :]] for one, x in run.signals.items()}
+    answer, refined, text = refined_answer(unknown(of, changed(run, **joined)))
     assert refined is not None and not answer.identified and "nothing is identified" in text
     assert "the halves of the recording differ by" in text and refined.halves_differ() > AGREE
+
+
+@pytest.mark.parametrize("name", ["heated_plate", "dc_motor"])
+def test_halves_that_cannot_be_compared_are_a_doubt(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of parameters that the weak form does not determine; its own are confirmed by it."""
+    outcome = refined_of(name)
+    monkeypatch.setattr(RefinedMechanism, "halves_differ", lambda _: np.inf)
+    assert _not_adopted(unknown(name), outcome) is None
+    assert any("nothing confirms" in one.text and one.alarm for one in _doubts(unknown(name), outcome))
+    assert not any("nothing confirms" in one.text for one in _doubts(answer_of(name), outcome))
 
 
 @pytest.mark.parametrize("name", ["isolator", "free_pendulum"])

@@ -27,6 +27,7 @@ Bool = npt.NDArray[np.bool_]
 
 BEARABLE = 30.0  # slow chi^2 up to which a refined answer is published, with a warning, where there is no other
 AGREE = 3.0  # standard errors by which two halves of a recording may differ whose residuals are more than noise
+APART = 4.0  # the same where the residuals are noise
 RIVAL = 3.0  # standard errors by which a fit may differ that explains the recording as well
 LARGEST_SKEW_S = 5e-3  # beyond it a skew may stand for another error
 _HALF_OF_RANGE = 0.5  # of the standard deviation of a guess: a larger standard error determines no offset
@@ -99,15 +100,17 @@ def _not_adopted(answer: Analysis, refined: RefinedMechanism) -> str | None:
     alike = not lacks.any() and not answer.model.refinement.equations
     if alike and length < asked / 2 and _spread(refined, weak.se) > 1:
         return f"blocks above {length:.2g} s do not fit, and shorter ones have larger standard errors"
-    if found.slow_chi2 <= GOOD or _better(answer, refined):
-        return None
+    noise = found.slow_chi2 <= GOOD
     residuals = f"slow residuals have {found.slow_chi2:.2g} times the variance of the noise"
-    if not (lacks & known).any() or not found.slow_chi2 <= BEARABLE:
+    if not (lacks & known).any():
+        return None if noise or _better(answer, refined) else residuals
+    if not found.slow_chi2 <= BEARABLE:
         return residuals
-    differ = refined.halves_differ()
-    if not differ <= AGREE:
-        return f"{residuals}, and the halves of the recording differ by {differ:.2g} standard errors"
-    return None
+    differ = refined.halves_differ()  # nothing else confirms what the weak form does not determine
+    if differ <= (APART if noise else AGREE) or (noise and np.isinf(differ)):
+        return None
+    before = "" if noise else f"{residuals}, and "
+    return f"{before}the halves of the recording differ by {differ:.2g} standard errors"
 
 
 def _spread(refined: RefinedMechanism, se: Float) -> float:
@@ -179,6 +182,9 @@ def _doubts(answer: Analysis, refined: RefinedMechanism) -> Iterator[Reason]:
     found = refined.found
     if found.slow_chi2 > GOOD and _lacks(answer).any():
         yield Reason("refined", f"Slow residuals have {found.slow_chi2:.2g} times the variance of the noise.")
+    elif _lacks(answer).any() and np.isinf(refined.halves_differ()):
+        text = "A half of the recording alone does not determine the parameters: nothing confirms the standard errors."
+        yield Reason("refined", text)
     if found.slow_chi2 > NOISE and (apart := _apart(answer, refined)):
         text = f"The refined answer is far from that of the weak form, and its residuals are more than noise{apart}."
         yield Reason("refined", text)

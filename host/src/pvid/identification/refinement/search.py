@@ -48,6 +48,7 @@ _OPTION_PASSES = 10
 _SHORTER = (0.5, 0.25)  # of a whole block: tried where the residuals are larger than the sensors' noise
 _LONGER = 3  # times a block: tried where they are not
 _GROWN = 1.25  # of standard errors: by which those of two lengths of a block differ by chance
+_BY_CHANCE = 4.0  # standard deviations of a chi^2: by so much the sum of squares rises with fewer starts
 _CHEAP = 1.3  # growth of the others' standard errors up to which an extra is free
 _TOLD = 9.0  # fall of the sum of squares from which it is free in any case
 _UNSURE = 0.05  # standard error of a logarithm from which friction is searched where residuals are no noise
@@ -304,7 +305,8 @@ class _Search:
 
     def _longer(self, problem: Problem, found: Refined) -> Refined:
         """Longer blocks, of which fewer starts are unknown, as long as residuals stay noise and the standard errors do
-        not grow by more than their own uncertainty."""
+        not grow by more than their own uncertainty; with a dry friction, whose errors at reversals grow along a block,
+        as long as the sum of squares rises by no more than fewer starts explain."""
         every = self._all
         dry = np.array([bool(every.width_of(one.name)) for one in problem.kernel.made.parameters])
         best, least = found, self._largest_error(problem, found)
@@ -317,6 +319,10 @@ class _Search:
             found, prior = self._with_extras(problem, prior, found)
             found = without_outliers(problem, prior, without_push(every, problem, prior, found))
             if not (found.slow_chi2 < NOISE and self._largest_error(problem, found) < _GROWN * least):
+                break
+            fewer = problem.kernel.states * (len(best.cut.first) - len(found.cut.first))
+            rise = found.sum_of_squares - best.sum_of_squares
+            if problem.kernel.widths and rise > fewer + _BY_CHANCE * np.sqrt(2 * fewer):
                 break
             if found.converged:
                 best, least = found, min(least, self._largest_error(problem, found))
