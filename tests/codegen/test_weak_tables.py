@@ -172,21 +172,20 @@ def test_overlapping_windows_inflate_variances_by_less_than_two() -> None:
 
 
 def test_a_recording_limits_its_samples() -> None:
-    """Ranges of all, and a least motion of the pivot, whose derivative the rows need; no other mechanism has one."""
-    for name in ("kapitza", "dc_motor"):
+    """Ranges of all; the least motion in half a window of each sensor, of a measured drive where the rows need its
+    derivative, of what the run may hold none."""
+    for name in ("kapitza", "dc_motor", "battery_2rc"):
         form = weak_form(name)
         config = config_of(form.config.design, 1000.0, form.rows.compiled.parameters, run=form.run)
         assert config.range is not None and form.config.range is None
         largest = [float(np.max(np.abs(form.run[one]))) for one in form.model.sample_names]
         assert (config.range >= 1.49 * np.array(largest)).all()
-        if name == "dc_motor":
-            assert config.drive_min is None
-            continue
-        signal = form.rows.compiled.bare.signal("y")
+        signals = {one.name: one for one in form.rows.compiled.bare.signals}
+        least = {"y": 4 * signals["y"].sd} if name == "kapitza" else {}
         assert config.drive_min is not None
         assert dict(zip(form.model.sample_names, config.drive_min, strict=True)) == {
-            "y": np.float32(4 * signal.sd),
-            "phi": 0.0,
+            one: np.float32(least.get(one, 0.0 if signals[one].driven else signals[one].resolution))
+            for one in form.model.sample_names
         }
 
 

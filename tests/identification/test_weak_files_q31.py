@@ -63,9 +63,9 @@ def test_they_belong_to_the_folder_of_a_model(files: dict[str, str]) -> None:
     assert "target_sources(rigid_body PRIVATE rigid_body_weak_q31.c)" in whole["CMakeLists.txt"]
 
 
-def test_a_measured_drive_has_a_least_deviation_in_counts() -> None:
-    """That of float32, of the pendulum's pivot alone: its angle may stand still."""
+def test_samples_have_a_least_deviation_in_counts() -> None:
+    """Those of float32: more than the noise of the pendulum's measured drive, a step of its encoder."""
     config = weak_q31_for_simulated_rig(compiled_of("kapitza")).config
     assert config.drive_min is not None
     y, phi = config.drive_min
-    assert y > 0 and phi == 0
+    assert y > 1 and phi == 1

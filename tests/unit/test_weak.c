@@ -579,6 +579,33 @@ static void windows_beyond_a_range_or_without_motion_are_dropped(void **state)
     assert_int_equal(reasons[PVID_HELD_NOT_EXCITED], self.estimator.counters.held_not_excited - held);
 }
 
+/* A sensor that stands still from one tick on, then moves: windows with one such half are dropped too. */
+static void a_half_without_motion_drops_both_windows_that_it_is_in(void **state)
+{
+    (void)state;
+    pvid_weak_design_f32 design;
+    pvid_weak_config_f32 config;
+    const float least[2] = {0.0f, 0.1f};
+    start(&design, &config);
+    config.drive_min = least;
+    assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+    first_order rig = {.generator = 9u};
+    uint32_t reasons[16];
+    (void)run(&rig, 10 * HOP, reasons);
+    while (self.sums.index != 0u) { /* to the end of a half */
+        (void)run(&rig, 1, reasons);
+    }
+    const uint32_t held = self.estimator.counters.held_not_excited;
+    const float stuck[2] = {1.0f, 1.0f};
+    while (self.sums.index + 1u < HOP) {
+        (void)pvid_weak_step_f32(&self, stuck);
+    }
+    (void)pvid_weak_step_f32(&self, stuck);
+    assert_true(self.limits.still[self.sums.half ^ 1u]);
+    (void)run(&rig, 4 * HOP, reasons);
+    assert_int_equal(self.estimator.counters.held_not_excited - held, 2);
+}
+
 static void outliers_are_rejected_by_the_gate(void **state)
 {
     (void)state;
@@ -746,6 +773,7 @@ int main(void)
         cmocka_unit_test(a_sample_that_is_not_finite_is_rejected_and_restarts),
         cmocka_unit_test(a_frozen_identifier_drops_windows_and_resumes),
         cmocka_unit_test(windows_beyond_a_range_or_without_motion_are_dropped),
+        cmocka_unit_test(a_half_without_motion_drops_both_windows_that_it_is_in),
         cmocka_unit_test(outliers_are_rejected_by_the_gate),
         cmocka_unit_test(init_names_what_is_out_of_range),
         cmocka_unit_test(an_object_before_its_init_does_nothing),

@@ -141,8 +141,8 @@ typedef struct {
     float sample_rate_hz;               /* ticks per second [Hz], 1e-3..1e6 */
     const pvid_weak_design_f32 *design; /* must outlive the identifier, with its tables */
     const float *range;     /* [samples] a window with a larger absolute value is dropped, > 0; NULL: no check */
-    const float *drive_min; /* [samples] a window in which a sample has a smaller standard deviation is dropped, >= 0;
-                               NULL: no check */
+    const float *drive_min; /* [samples] a window with a half in which a sample has a smaller standard deviation is
+                               dropped, >= 0: its sensor stands still; NULL: no check */
     bool compensation;      /* corrects the bias by the sensors' noise (errors in variables) */
     uint8_t iterations;     /* Gauss-Newton steps in each of the first eight windows, 1..PVID_MAX_ITERATIONS; then one.
                                Recommended: 2; with 1 a start that is 50 % off needs three or four windows more */

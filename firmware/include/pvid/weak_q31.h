@@ -135,8 +135,8 @@ typedef struct {
 typedef struct {
     const pvid_weak_design_q31 *design; /* must outlive the identifier, with its tables */
     const int32_t *offset;              /* [samples] reading of each sensor at 0, within +-2^30 [counts] */
-    const int32_t *drive_min; /* [samples] a window in which a sample has a smaller standard deviation is dropped,
-                                 0..2^24 [counts]; NULL: no check */
+    const int32_t *drive_min; /* [samples] a window with a half in which a sample has a smaller standard deviation is
+                                 dropped, 0..2^24 [counts]: its sensor stands still; NULL: no check */
     bool compensation;        /* corrects the bias by the sensors' noise (errors in variables), as in weak.h */
     uint8_t iterations; /* Gauss-Newton steps in each of the first eight windows, 1..PVID_MAX_ITERATIONS; then one.
                            Recommended: 2, as in weak.h */

@@ -3,9 +3,9 @@
 /* Every tick compares each sample with its range (weak_front_f32.h). A sample beyond it counts for the present step
  * and for all later ones that contain it.
  *
- * At every step each sample x adds x - r and (x - r)^2 to its half, r the half's first sample. With d = r_B - r_A the
- * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps
- * is (q - s^2/N) / N of both halves together. */
+ * At every step each sample x adds x - r and (x - r)^2 to s and q, r the half's first sample. Its variance in a half of
+ * N steps is (q - s^2/N) / N. A sensor that stops moving, or begins to, inside a window would be taken for motion of
+ * the mechanism: both halves must move. */
 #include "weak/limits_f32.h"
 
 #include "number/exact.h"
@@ -37,7 +37,7 @@ void pvid_weak_limits_step_f32(pvid_weak_limits_f32 *self, size_t samples, const
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < count; i++) {
         if (((self->moves >> i) & 1u) != 0u) {
-            pvid_weak_spread_f32 *spread = &self->spread[half][i];
+            pvid_weak_spread_f32 *spread = &self->spread[i];
             if (first) {
                 spread->reference = sample[i];
                 spread->sum = 0.0f;
@@ -50,26 +50,24 @@ void pvid_weak_limits_step_f32(pvid_weak_limits_f32 *self, size_t samples, const
     }
 }
 
+PVID_COLD void pvid_weak_limits_half_f32(pvid_weak_limits_f32 *self, size_t samples, size_t half, uint16_t hop)
+{
+    const float n = (float)hop;
+    bool still = false;
+    for (size_t i = 0; i < samples; i++) {
+        const pvid_weak_spread_f32 *one = &self->spread[i];
+        const float variance = (one->square - ((one->sum * one->sum) / n)) / n;
+        still = still || ((((self->moves >> i) & 1u) != 0u) && (variance < (self->drive_min[i] * self->drive_min[i])));
+    }
+    self->still[half] = still;
+}
+
 bool pvid_weak_limits_beyond_f32(const pvid_weak_limits_f32 *self)
 {
     return self->out[0] || self->out[1];
 }
 
-PVID_COLD void pvid_weak_limits_half_f32(pvid_weak_limits_f32 *self, size_t samples, size_t later, uint16_t hop)
+bool pvid_weak_limits_still_f32(const pvid_weak_limits_f32 *self)
 {
-    bool still = false;
-    const float n = (float)hop;
-    for (size_t i = 0; i < samples; i++) {
-        if (((self->moves >> i) & 1u) == 0u) {
-            continue;
-        }
-        const pvid_weak_spread_f32 *a = &self->spread[later ^ 1u][i];
-        const pvid_weak_spread_f32 *b = &self->spread[later][i];
-        const float d = b->reference - a->reference;
-        const float sum = (a->sum + b->sum) + (n * d);
-        const float square = (a->square + (b->square + ((2.0f * d) * b->sum))) + ((n * d) * d);
-        const float variance = (square - ((sum * sum) / (2.0f * n))) / (2.0f * n);
-        still = still || (variance < (self->drive_min[i] * self->drive_min[i]));
-    }
-    self->still = still;
+    return self->still[0] || self->still[1];
 }

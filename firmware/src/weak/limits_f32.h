@@ -17,11 +17,13 @@ void pvid_weak_limits_reset_f32(pvid_weak_limits_f32 *self);
 void pvid_weak_limits_step_f32(pvid_weak_limits_f32 *self, size_t samples, const float sample[], size_t half,
                                bool first);
 
-/* Behind the last step of the half `later`, which has so many: sets `still` if a sample moved too little in it and the
- * half before. */
-void pvid_weak_limits_half_f32(pvid_weak_limits_f32 *self, size_t samples, size_t later, uint16_t hop);
+/* Behind the last step of a half, which has so many. */
+void pvid_weak_limits_half_f32(pvid_weak_limits_f32 *self, size_t samples, size_t half, uint16_t hop);
 
 /* Whether a sample of the last two halves was beyond its range. */
 bool pvid_weak_limits_beyond_f32(const pvid_weak_limits_f32 *self);
+
+/* Whether a sample moved too little in one of the last two halves. */
+bool pvid_weak_limits_still_f32(const pvid_weak_limits_f32 *self);
 
 #endif

@@ -271,7 +271,7 @@ PVID_COLD static pvid_reason drop_reason(pvid_weak_f32 *self)
         pvid_count_up(&self->estimator.counters.held_out_of_range);
         return PVID_HELD_OUT_OF_RANGE;
     }
-    if (self->limits.still) {
+    if (pvid_weak_limits_still_f32(&self->limits)) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }

@@ -96,7 +96,6 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     }
     self->design = design;
     self->drive_min = config->drive_min;
-    self->driven = config->drive_min == NULL;
     self->iterations = (uint8_t)((self->estimator.settings.gain < PVID_ONE_Q30) ? 1u : config->iterations);
     pvid_weak_accumulator_init_q31(&self->accumulator, design, config->offset);
     const uint32_t ticks = pvid_weak_free_ticks_q31(design);
@@ -120,38 +119,34 @@ pvid_status pvid_weak_init_layout_q31(pvid_weak_q31 *self, const pvid_weak_confi
     return pvid_init_end(self, sizeof *self, status);
 }
 
-/* The counts of the tick in which the channels of step `index` of a half were made. */
-static void add_drive(pvid_weak_q31 *self, size_t half, bool begins, const int32_t reading[])
+/* The counts of the tick in which the channels of a step were made. */
+static void add_drive(pvid_weak_q31 *self, bool begins, const int32_t reading[])
 {
     pvid_weak_drive_q31 *drive = &self->drive;
     for (size_t i = 0; i < self->design->model->samples; i++) {
         if (self->drive_min[i] > 0) {
             const int32_t x = pvid_weak_count_q31(reading[i], self->accumulator.front.offset[i]);
-            drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
-            drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_short_square_q31(x);
+            drive->sum[i] = (begins ? 0 : drive->sum[i]) + x;
+            drive->square[i] = (begins ? 0 : drive->square[i]) + pvid_short_square_q31(x);
         }
     }
 }
 
-/* Whether every sample of the last two halves moved as much as it must. |counts| <= 2^24 and 2 hop <= 2^13: nothing
- * overflows.
- */
-static bool is_driven(const pvid_weak_q31 *self)
+/* Whether a sample moved less in a half than it must. |counts| <= 2^24 and hop <= 2^12: nothing overflows. */
+static bool is_still(const pvid_weak_q31 *self)
 {
-    const int64_t n = 2 * (int64_t)self->design->hop;
-    bool driven = true;
-    for (size_t i = 0; (self->drive_min != NULL) && (i < self->design->model->samples); i++) {
-        if (self->drive_min[i] == 0) {
-            continue;
-        }
-        const int64_t sum = self->drive.sum[0][i] + self->drive.sum[1][i];
-        const int64_t square = self->drive.square[0][i] + self->drive.square[1][i];
-        const int64_t mean = sum / n;
-        const int64_t spread = square - (mean * ((2 * sum) - (n * mean)));
+    const int64_t n = (int64_t)self->design->hop;
+    bool still = false;
+    for (size_t i = 0; i < self->design->model->samples; i++) {
         const int64_t least = self->drive_min[i];
-        driven = driven && (spread >= (n * (least * least)));
+        if (least > 0) {
+            const int64_t sum = self->drive.sum[i];
+            const int64_t mean = sum / n;
+            const int64_t spread = self->drive.square[i] - (mean * ((2 * sum) - (n * mean)));
+            still = still || (spread < (n * (least * least)));
+        }
     }
-    return driven;
+    return still;
 }
 
 /* A whole window. Returns PVID_ACCUMULATED, or the reason why it is dropped. */
@@ -162,7 +157,7 @@ static pvid_reason hand_over(pvid_weak_q31 *self)
         pvid_weak_finish_skip_q31(&self->finish);
         return PVID_HELD_FROZEN;
     }
-    if (!self->driven) {
+    if (self->drive.still[0] || self->drive.still[1]) {
         pvid_weak_finish_skip_q31(&self->finish);
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
@@ -185,9 +180,9 @@ PVID_NOINLINE static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t 
     const uint8_t half = self->accumulator.values.half;
     const pvid_weak_tick tick = pvid_weak_accumulator_end_q31(&self->accumulator);
     if ((tick != PVID_WEAK_REJECTED) && (self->drive_min != NULL) && (self->accumulator.values.index != index)) {
-        add_drive(self, half, index == 0u, reading);
+        add_drive(self, index == 0u, reading);
         if (self->accumulator.values.index == 0u) { /* the half is complete */
-            self->driven = is_driven(self);
+            self->drive.still[half] = is_still(self);
         }
     }
     return tick;

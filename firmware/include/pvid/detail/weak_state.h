@@ -51,7 +51,7 @@ typedef struct {
     float edge[2][PVID_MAX_INTEGRANDS];      /* I^1 and I^2 of the half before, at its end */
 } pvid_weak_history_f32;
 
-/* What a half window has seen of a sample. */
+/* A sample in the half window that fills. */
 typedef struct {
     float reference; /* the half's first sample */
     float sum;       /* of the samples less that, one a step */
@@ -62,12 +62,12 @@ typedef struct {
 typedef struct {
     const float *range; /* of the configuration; NULL: no check */
     const float *drive_min;
-    uint32_t moves;                                   /* bit i set: sample i has a least deviation */
-    uint16_t delay;                                   /* steps from a sample to the last step that it is part of */
-    uint16_t beyond;                                  /* steps that may yet contain a sample beyond its range */
-    bool out[2];                                      /* of each half: contains such a step */
-    bool still;                                       /* a sample moved too little in the last two halves */
-    pvid_weak_spread_f32 spread[2][PVID_MAX_SAMPLES]; /* of each half, if a sample has a least deviation */
+    uint32_t moves;                                /* bit i set: sample i has a least deviation */
+    uint16_t delay;                                /* steps from a sample to the last step that it is part of */
+    uint16_t beyond;                               /* steps that may yet contain a sample beyond its range */
+    bool out[2];                                   /* of each half: contains such a step */
+    bool still[2];                                 /* of each half: a sample moved too little */
+    pvid_weak_spread_f32 spread[PVID_MAX_SAMPLES]; /* of samples with a least deviation */
 } pvid_weak_limits_f32;
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */

@@ -105,10 +105,11 @@ typedef struct {
     pvid_weak_window_q31 window;
 } pvid_weak_accumulator_q31;
 
-/* Sums of a sample over the steps of each half [counts], for the check of the drive. */
+/* Sums of each sample over the steps of the half that fills [counts], if it has a least deviation. */
 typedef struct {
-    int64_t sum[2][PVID_MAX_SAMPLES];
-    int64_t square[2][PVID_MAX_SAMPLES];
+    bool still[2]; /* of each half: a sample moved too little */
+    int64_t sum[PVID_MAX_SAMPLES];
+    int64_t square[PVID_MAX_SAMPLES];
 } pvid_weak_drive_q31;
 
 /* While the noise of a kind's rows is computed anew, before and behind its columns. */
@@ -222,7 +223,6 @@ struct pvid_weak_q31 {
     uint8_t stages_per_tick; /* stages of a whole window per tick */
     bool warm;               /* a window has been complete since the restart */
     bool frozen;             /* complete windows are dropped */
-    bool driven;             /* the last two halves had enough drive */
     pvid_weak_drive_q31 drive;
     pvid_weak_accumulator_q31 accumulator;
     pvid_weak_finish_q31 finish;

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.model.compiled import CompiledModel
+from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import inflation
 from pvid.oracle.weak.front import step_weights_of, weights_of
@@ -183,15 +183,23 @@ def _ranges(model: WeakModel, compiled: CompiledModel, run: Mapping[str, npt.Arr
 
 
 def drive_min_of(design: WeakDesign32, compiled: CompiledModel) -> npt.NDArray[np.float32] | None:
-    """Standard deviation in a window below which a measured drive stands still: its derivatives are noise then."""
+    """Standard deviation in half a window below which a sample stands still, one each; 0: it may.
+
+    Of a sensor of the mechanism its resolution: it is stuck, unplugged, or the mechanism rests. Of a measured drive,
+    which the run may hold, more than its noise where the rows need its derivatives.
+    """
     model = design.model
     derived = {model.signal[one.signal].sample for one in model.jet if one.order}
-    signals = [compiled.signal(name) for name in model.sample_names]
-    least = [
-        _STILL * one.sd if place in derived and one.driven and one.kind == "sensor" else 0.0
-        for place, one in enumerate(signals)
-    ]
+    least = [_still(compiled.signal(name), place in derived) for place, name in enumerate(model.sample_names)]
     return _as_float32(least) if any(least) else None
+
+
+def _still(signal: Signal, derived: bool) -> float:
+    if signal.kind == "input":
+        return 0.0
+    if signal.driven:
+        return _STILL * signal.sd if derived else 0.0
+    return signal.resolution
 
 
 def _within_float32(bounds: list[float]) -> Float:
