@@ -364,6 +364,56 @@ static void steps_are_limited_and_bounded(void **state)
     assert_true(estimator.counters.bounded >= 20u);
 }
 
+/* Rows whose entries resemble each other, one parameter with a bound at each side of its unconstrained value: p is the
+ * minimum within the bounds, found here by projected coordinate steps in double. */
+static void the_others_are_solved_beside_bounds_that_act(void **state)
+{
+    (void)state;
+    static pvid_estimator_q31 estimator;
+    config.upper[0] = P_ONE / 2;  /* the truth is 0.75 */
+    config.lower[1] = -P_ONE / 4; /* -0.5 */
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
+    double m[PVID_MAX_P][PVID_MAX_P] = {{0.0}};
+    double b[PVID_MAX_P] = {0.0};
+    for (int row = 0; row < 60; row++) {
+        int32_t n[PVID_MAX_P];
+        const int32_t shared = random_within(1 << 15);
+        double y = random_within(100);
+        for (size_t i = 0; i < PVID_MAX_P; i++) {
+            n[i] = shared + random_within(1 << 14);
+            y += truth[i] * n[i];
+        }
+        const int32_t rounded = (int32_t)floor(y + 0.5);
+        assert_int_equal(pvid_estimator_add_q31(&estimator, n, rounded), PVID_ACCUMULATED);
+        for (size_t i = 0; i < PVID_MAX_P; i++) {
+            b[i] += (double)n[i] * rounded;
+            for (size_t j = 0; j < PVID_MAX_P; j++) {
+                m[i][j] += (double)n[i] * n[j];
+            }
+        }
+    }
+    for (int i = 0; i < 40; i++) {
+        assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
+    }
+    double p[PVID_MAX_P] = {0.0};
+    for (int sweep = 0; sweep < 4000; sweep++) {
+        for (size_t i = 0; i < PVID_MAX_P; i++) {
+            double rest = b[i];
+            for (size_t j = 0; j < PVID_MAX_P; j++) {
+                rest -= m[i][j] * p[j];
+            }
+            p[i] =
+                fmin(fmax(p[i] + (rest / m[i][i]), (double)config.lower[i] / P_ONE), (double)config.upper[i] / P_ONE);
+        }
+    }
+    assert_int_equal(estimator.p[0], config.upper[0]);
+    assert_int_equal(estimator.p[1], config.lower[1]);
+    assert_true(fabs(p[3] - truth[3]) > 0.01); /* the bounds move it: 64 of Y over 60 rows of 2^14 are 0.0005 */
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        assert_true(fabs(p_of(&estimator, i) - p[i]) < 1.0e-4); /* an eighth of a standard error */
+    }
+}
+
 static void counters_stop_at_their_end(void **state)
 {
     (void)state;
@@ -388,6 +438,7 @@ int main(void)
         cmocka_unit_test_setup(a_row_at_its_limit_fits, start_again),
         cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),
         cmocka_unit_test_setup(steps_are_limited_and_bounded, start_again),
+        cmocka_unit_test_setup(the_others_are_solved_beside_bounds_that_act, start_again),
         cmocka_unit_test(counters_stop_at_their_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

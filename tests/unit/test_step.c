@@ -56,7 +56,7 @@ static pvid_solution_f32 solved(const pvid_system_f32 *system, const pvid_solve_
     memcpy(p, start, sizeof start);
     solution.reason = pvid_step_factor_f32(system, settings, &factor);
     if (solution.reason == PVID_UPDATED) {
-        pvid_step_take_f32(system, settings, &factor, start, system->force, &solution);
+        pvid_step_take_f32(system, settings, &factor, 0, start, system->force, &solution);
     }
     return solution;
 }
@@ -87,7 +87,7 @@ static void the_right_hand_side_may_differ_from_the_force(void **state)
     pvid_cholesky_f32 factor;
     pvid_solution_f32 solution = {.p = p};
     assert_int_equal(pvid_step_factor_f32(&system, &settings, &factor), PVID_UPDATED);
-    pvid_step_take_f32(&system, &settings, &factor, start, rhs, &solution);
+    pvid_step_take_f32(&system, &settings, &factor, 0, start, rhs, &solution);
     assert_float_equal(p[0], 2.875f, 1.0e-6f);
     assert_float_equal(p[1], -1.75f, 1.0e-6f);
 }
@@ -103,7 +103,7 @@ static void a_step_in_place_is_the_same(void **state)
     pvid_solution_f32 solution = {.p = in_place};
     (void)solved(&system, &settings, p);
     assert_int_equal(pvid_step_factor_f32(&system, &settings, &factor), PVID_UPDATED);
-    pvid_step_take_f32(&system, &settings, &factor, in_place, system.force, &solution);
+    pvid_step_take_f32(&system, &settings, &factor, 0, in_place, system.force, &solution);
     assert_memory_equal(p, in_place, sizeof p);
 }
 
@@ -120,6 +120,53 @@ static void a_large_step_is_shortened_as_a_whole(void **state)
     assert_float_equal(solution.size, 0.875f, 1.0e-6f);
     assert_float_equal(p[0], 2.875f, 1.0e-6f);
     assert_float_equal(p[1], -1.75f, 1.0e-6f);
+}
+
+/* S = (8 4; 4 10) with the second at its lower bound and F = (8, -8), which pulls it outwards: the first alone, 8/8. */
+static void a_parameter_that_is_pulled_out_of_its_bound_is_pinned(void **state)
+{
+    (void)state;
+    pvid_solve_settings_f32 settings = wide_settings();
+    settings.lower[1] = start[1];
+    pvid_system_f32 system = known_system();
+    float p[2] = {start[0], start[1]};
+    pvid_cholesky_f32 factor;
+    pvid_solution_f32 solution = {.p = p};
+    const uint8_t pinned = pvid_step_pin_f32(&system, &settings, p);
+    assert_int_equal(pinned, 2);
+    assert_int_equal(pvid_step_factor_f32(&system, &settings, &factor), PVID_UPDATED);
+    pvid_step_take_f32(&system, &settings, &factor, pinned, start, system.force, &solution);
+    assert_float_equal(p[0], 3.0f, 3.0e-6f);
+    assert_float_equal(p[1], start[1], 0.0f);
+    assert_true(solution.bounded);
+    assert_int_equal(solution.blocked, 0);
+    system = known_system();
+    system.force[1] = 8.0f; /* inwards: nothing is pinned */
+    assert_int_equal(pvid_step_pin_f32(&system, &settings, start), 0);
+    assert_float_equal(system.s[1][1], 10.0f, 0.0f);
+}
+
+/* F = (8, 2) pulls the second inwards, and dp = (1.125, -0.25) outwards: no step; the next solve pins it. */
+static void a_step_that_leaves_a_bound_waits_for_the_next_solve(void **state)
+{
+    (void)state;
+    pvid_solve_settings_f32 settings = wide_settings();
+    settings.lower[1] = start[1];
+    pvid_system_f32 system = known_system();
+    system.force[1] = 2.0f;
+    float p[2];
+    const pvid_solution_f32 solution = solved(&system, &settings, p);
+    assert_int_equal(solution.reason, PVID_UPDATED);
+    assert_int_equal(solution.blocked, 2);
+    assert_float_equal(solution.size, 0.5625f, 1.0e-6f); /* of the step that is not taken: p has not converged */
+    assert_memory_equal(p, start, sizeof p);
+    settings.blocked = solution.blocked;
+    assert_int_equal(pvid_step_pin_f32(&system, &settings, p), 2);
+    settings.gain = 0.0f; /* equation (5) alone: the step, clamped */
+    system.s[1][1] = 10.0f;
+    assert_int_equal(solved(&system, &settings, p).blocked, 0);
+    assert_float_equal(p[0], 3.125f, 1.0e-6f);
+    assert_float_equal(p[1], start[1], 0.0f);
 }
 
 static void a_step_stops_at_the_bounds(void **state)
@@ -327,6 +374,8 @@ int main(void)
         cmocka_unit_test(the_right_hand_side_may_differ_from_the_force),
         cmocka_unit_test(a_step_in_place_is_the_same),
         cmocka_unit_test(a_large_step_is_shortened_as_a_whole),
+        cmocka_unit_test(a_parameter_that_is_pulled_out_of_its_bound_is_pinned),
+        cmocka_unit_test(a_step_that_leaves_a_bound_waits_for_the_next_solve),
         cmocka_unit_test(a_step_stops_at_the_bounds),
         cmocka_unit_test(a_singular_system_holds_p),
         cmocka_unit_test(a_number_that_is_none_holds_p),

@@ -87,7 +87,7 @@ typedef struct {
     uint32_t rows;    /* rows added */
     uint32_t updates; /* steps of p */
     uint32_t limited; /* of those, shortened to step_limit */
-    uint32_t bounded; /* of those, stopped at a bound */
+    uint32_t bounded; /* of those, with a parameter at its bound */
     uint32_t held_not_excited;
     uint32_t held_singular;
     uint32_t rejected_not_finite;

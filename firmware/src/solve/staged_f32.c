@@ -171,6 +171,9 @@ static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
         solve->diagonal[a] = solve->system.s[a][a];
         solve->system.s[a][a] += self->settings.prior[a];
     }
+    if (solve->gain > 0.0f) { /* equation (5) alone has no solution to stay at */
+        solve->pinned = pvid_step_pin_f32(&solve->system, &self->settings, self->p);
+    }
     const pvid_reason reason = pvid_step_factor_f32(&solve->system, &self->settings, &solve->work.factor);
     const bool noise = (reason == PVID_UPDATED) && !solve->above_noise;
     solve->reason = noise ? PVID_HELD_NOT_EXCITED : reason;
@@ -183,7 +186,7 @@ static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
 static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, const float rhs[])
 {
     pvid_solution_f32 solution = {.p = solve->p};
-    pvid_step_take_f32(&solve->system, &self->settings, &solve->work.factor, self->p, rhs, &solution);
+    pvid_step_take_f32(&solve->system, &self->settings, &solve->work.factor, solve->pinned, self->p, rhs, &solution);
     if (solution.reason != PVID_UPDATED) {
         solve->reason = pvid_count_held(&self->counters, solution.reason);
     }
@@ -191,6 +194,7 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
         pvid_count_up(&self->counters.in_dead_zone);
     }
     pvid_count_step(&self->counters, solution.limited, solution.bounded);
+    self->settings.blocked = (uint8_t)((solution.blocked != 0u) ? (solution.blocked | (uint32_t)solve->pinned) : 0u);
     solve->in_dead_zone = solution.in_dead_zone;
     solve->size = solution.size;
 }
@@ -318,6 +322,7 @@ static void reset_solve(const pvid_estimator_f32 *self, pvid_estimator_solve_f32
     solve->size = 0.0f;
     solve->ends_group = false;
     solve->in_dead_zone = false;
+    solve->pinned = 0;
     solve->fallback = NULL;
     solve->noise = NULL;
     solve->estimate = NULL;

@@ -137,11 +137,78 @@ static void add_prior(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *
     }
 }
 
+/* b by rows of C, all data: force_i 2^(the result + h_i). */
+static int32_t whole_force(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int32_t force[])
+{
+    const size_t n = self->model->n_theta;
+    const int64_t *b = pvid_b_of_q31(&self->information);
+    int64_t wide[PVID_MAX_THETA_Q31];
+    for (size_t i = 0; i < n; i++) {
+        wide[i] = pvid_scale_q31(b[i], solve->h[i]);
+    }
+    return pvid_to_block_q31((uint32_t)n, wide, 30, force);
+}
+
+/* projected = C^T force. */
+static void project_force(const pvid_model_q31 *model, const pvid_estimator_solve_q31 *solve, const int32_t force[],
+                          int64_t projected[PVID_MAX_P])
+{
+    memset(projected, 0, PVID_MAX_P * sizeof projected[0]);
+    for (size_t k = 0; k < model->n_c; k++) {
+        projected[model->c_column[k]] += pvid_product_q31(solve->part.early.c[k], force[model->c_row[k]]);
+    }
+}
+
+/* Whether p[a] is at a bound from which this force pulls it outwards. */
+static bool is_held_by(const pvid_estimator_q31 *self, size_t a, int64_t force)
+{
+    const pvid_solve_settings_q31 *settings = &self->settings;
+    return ((self->p[a] <= settings->lower[a]) && (force < 0)) || ((self->p[a] >= settings->upper[a]) && (force > 0));
+}
+
+/* The parameters of which this holds, a bit for each. */
+static uint32_t outwards(const pvid_estimator_q31 *self, const int64_t force[])
+{
+    uint32_t bits = 0;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        bits |= (uint32_t)(is_held_by(self, a, force[a]) ? 1u : 0u) << a;
+    }
+    return bits;
+}
+
+/* Bounds are one-sided constraints. Those that act keep their parameters, a bit for each: F pulls these outwards, or
+ * the last solve would have (`blocked`). They leave S, and the others are solved without them. Source: theory.md 4,
+ * (6a). */
+static void pin(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t n_p = self->model->n_p;
+    bool any = false;
+    for (size_t a = 0; a < n_p; a++) {
+        any = any || is_held_by(self, a, -1) || is_held_by(self, a, 1);
+    }
+    if (!any || (solve->gain == 0)) { /* equation (5) alone has no solution to stay at */
+        return;
+    }
+    int32_t of_b[PVID_MAX_THETA_Q31];
+    int64_t force[PVID_MAX_P];
+    (void)whole_force(self, solve, of_b);
+    project_force(self->model, solve, of_b, force);
+    const uint32_t pinned = outwards(self, force) | (uint32_t)self->settings.blocked;
+    for (size_t a = 0; a < n_p; a++) {
+        for (size_t b = a + 1u; b < n_p; b++) {
+            const bool free = (((pinned >> a) | (pinned >> b)) & 1u) == 0u;
+            solve->now.system.s[a][b] = free ? solve->now.system.s[a][b] : 0;
+        }
+    }
+    solve->pinned = (uint8_t)pinned;
+}
+
 static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
 {
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
         add_prior(self, solve);
+        pin(self, solve);
         pvid_system_begin_factor_q31(&solve->now.system, n_p, (const int64_t (*)[PVID_MAX_P])solve->now.system.s);
         return;
     }
@@ -159,16 +226,14 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     }
 }
 
-/* rhs = C^T force, scaled as the rows of q, and x, its solution; returns the exponent of x. */
+/* rhs = C^T force, 0 for pinned parameters, scaled as the rows of q, and x, its solution; returns the exponent of x. */
 static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve_q31 *solve, const int32_t force[],
                          int64_t rhs[PVID_MAX_P], int32_t x[])
 {
-    memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
-    for (size_t k = 0; k < model->n_c; k++) {
-        rhs[model->c_column[k]] += pvid_product_q31(solve->part.early.c[k], force[model->c_row[k]]);
-    }
+    project_force(model, solve, force, rhs);
     for (size_t a = 0; a < model->n_p; a++) {
-        rhs[a] = pvid_scale_q31(rhs[a], solve->now.system.g[a]);
+        const bool free = (((uint32_t)solve->pinned >> a) & 1u) == 0u;
+        rhs[a] = free ? pvid_scale_q31(rhs[a], solve->now.system.g[a]) : 0;
     }
     return pvid_cholesky_solve_q31(&solve->now.system.factor, rhs, x);
 }
@@ -176,14 +241,8 @@ static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve
 /* F^T (S + H0)^-1 F, F of all data, in the unit of the sums of squares. */
 static pvid_scaled_q31 newton_decrement_square(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
 {
-    const size_t n = self->model->n_theta;
-    const int64_t *b = pvid_b_of_q31(&self->information);
-    int64_t wide[PVID_MAX_THETA_Q31];
     int32_t force[PVID_MAX_THETA_Q31];
-    for (size_t i = 0; i < n; i++) {
-        wide[i] = pvid_scale_q31(b[i], solve->h[i]);
-    }
-    const int32_t down = pvid_to_block_q31((uint32_t)n, wide, 30, force);
+    const int32_t down = whole_force(self, solve, force);
     int64_t rhs[PVID_MAX_P];
     int32_t x[PVID_MAX_P];
     int32_t f[PVID_MAX_P];
@@ -229,8 +288,13 @@ static void take_step(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     pvid_solution_q31 solution = {.p = solve->now.step.p};
     pvid_step_take_q31(&self->settings, self->p, solve->part.dp, &solution);
-    pvid_count_step(&self->counters, solution.limited, solution.bounded);
     solve->size = solution.size;
+    const uint32_t blocked = (self->settings.gain != 0) ? outwards(self, solve->part.dp) : 0u;
+    if (blocked != 0u) { /* the others would go elsewhere without it: no step */
+        memcpy(solve->now.step.p, self->p, sizeof solve->now.step.p);
+    }
+    self->settings.blocked = (uint8_t)((blocked != 0u) ? (blocked | (uint32_t)solve->pinned) : 0u);
+    pvid_count_step(&self->counters, solution.limited, solution.bounded || (solve->pinned != 0u));
 }
 
 /* theta_step and its exponent: dtheta scaled as the columns of m. */
@@ -362,6 +426,7 @@ static void reset_solve(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     solve->above_noise = true;
     solve->has_fallback = false;
     solve->in_dead_zone = false;
+    solve->pinned = 0;
     solve->keeps_matrix = false;
     solve->gain = PVID_ONE_Q30;
     solve->size = 0;

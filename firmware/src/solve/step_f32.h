@@ -2,7 +2,7 @@
  * arguments alone. Private to the core, inlined.
  *
  *   reason = pvid_step_factor_f32(&system, &settings, &factor);
- *   if (reason == PVID_UPDATED) pvid_step_take_f32(&system, &settings, &factor, p, rhs, &solution);
+ *   if (reason == PVID_UPDATED) pvid_step_take_f32(&system, &settings, &factor, pinned, p, rhs, &solution);
  */
 #ifndef PVID_STEP_F32_H
 #define PVID_STEP_F32_H
@@ -24,7 +24,8 @@ typedef struct {
     pvid_reason reason; /* PVID_UPDATED, or PVID_HELD_SINGULAR if dp is not finite */
     bool in_dead_zone;  /* p is within the dead zone: no step */
     bool limited;       /* shortened to step_limit */
-    bool bounded;       /* a parameter was stopped at its bound */
+    bool bounded;       /* a parameter was stopped at its bound, or stays there */
+    uint8_t blocked;    /* bit a: p[a] is at a bound and dp pulls it outwards: no step */
 } pvid_solution_f32;
 
 /* Relative size of a step in parameter a: relative to p if it is a positive parameter, else to start_sd. Returns the
@@ -63,6 +64,40 @@ static inline float pvid_step_bounded_f32(const pvid_solve_settings_f32 *setting
         *bounded = true;
     }
     return x;
+}
+
+#define PVID_PIN 1048576.0f /* 2^20: what a pinned parameter still takes from another is rounding */
+
+/* Parameters that are at a bound from which `pull` moves them outwards, a bit for each. */
+static inline uint8_t pvid_step_outwards_f32(size_t n, const float p[], const float lower[], const float upper[],
+                                             const float pull[])
+{
+    uint32_t outwards = 0;
+    for (size_t a = 0; a < n; a++) {
+        const bool out = ((p[a] <= lower[a]) && (pull[a] < 0.0f)) || ((p[a] >= upper[a]) && (pull[a] > 0.0f));
+        outwards |= (uint32_t)(out ? 1u : 0u) << a;
+    }
+    return (uint8_t)outwards;
+}
+
+static inline bool pvid_step_has_f32(uint8_t bits, size_t a)
+{
+    return (((uint32_t)bits >> a) & 1u) != 0u;
+}
+
+/* Bounds are one-sided constraints. Those that act keep their parameters, a bit for each: F pulls these outwards, or
+ * the last solve would have (`blocked`). Their diagonal entry of S is raised, as if they were known, so that the others
+ * are solved without them. Source: theory.md 4, (6a). */
+static inline uint8_t pvid_step_pin_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                                        const float p[])
+{
+    const size_t n_p = PVID_COUNT(PVID_MAX_P, settings->n_p);
+    const uint32_t outwards = pvid_step_outwards_f32(n_p, p, settings->lower, settings->upper, system->force);
+    const uint8_t pinned = (uint8_t)(outwards | settings->blocked);
+    for (size_t a = 0; (pinned != 0u) && (a < n_p); a++) {
+        system->s[a][a] *= pvid_step_has_f32(pinned, a) ? PVID_PIN : 1.0f;
+    }
+    return pinned;
 }
 
 /* Factor that shortens a step of this relative size to the step limit; sets *limited. */
@@ -112,32 +147,44 @@ static inline pvid_reason pvid_step_factor_f32(const pvid_system_f32 *system, co
     return pvid_step_is_excited_f32(settings, kappa, system->s[0][0]) ? PVID_UPDATED : PVID_HELD_NOT_EXCITED;
 }
 
-/* dp = (S + H0)^-1 rhs, shortened to the step limit, and p + dp within the bounds. No step in the dead zone. Fails iff
- * dp is not finite: solution->reason is PVID_HELD_SINGULAR. Cost: a solve, two with a dead zone, n_p
- * + 1 divisions. Source: theory.md 4, equation (6). */
+/* dp = (S + H0)^-1 rhs, 0 for the pinned parameters (a bit for each), shortened to the step limit, and p + dp within
+ * the bounds. No step in the dead zone, and none where dp pulls another parameter out of its bound: without it the
+ * others would go elsewhere. Fails iff dp is not finite: solution->reason is PVID_HELD_SINGULAR. Cost: a solve, two
+ * with a dead zone, n_p + 1 divisions. Source: theory.md 4, (6), (6a). */
 static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
-                                      const pvid_cholesky_f32 *factor, const float p[], const float rhs[],
-                                      pvid_solution_f32 *solution)
+                                      const pvid_cholesky_f32 *factor, uint8_t pinned, const float p[],
+                                      const float rhs[], pvid_solution_f32 *solution)
 {
     float dp[PVID_MAX_P];
     solution->reason = PVID_UPDATED;
     solution->size = 0.0f;
     solution->limited = false;
-    solution->bounded = false;
+    solution->bounded = pinned != 0u;
+    solution->blocked = 0;
     solution->in_dead_zone = (PVID_DEAD_ZONE != 0) && (settings->dead_zone > 0.0f) &&
                              pvid_step_is_in_dead_zone_f32(system, settings, factor);
     if (solution->in_dead_zone) {
         return;
     }
     pvid_cholesky_solve_f32(factor, rhs, dp);
+    for (size_t a = 0; (pinned != 0u) && (a < settings->n_p); a++) {
+        dp[a] = pvid_step_has_f32(pinned, a) ? 0.0f : dp[a];
+    }
     const float size = pvid_step_size_f32(settings, p, dp);
     if (!pvid_finite_f32(size)) {
         solution->reason = PVID_HELD_SINGULAR;
         return;
     }
     solution->size = size;
-    const float part = pvid_step_shortening_f32(settings, size, &solution->limited);
     const size_t n_p = PVID_COUNT(PVID_MAX_P, settings->n_p);
+    if (settings->gain > 0.0f) {
+        solution->blocked = pvid_step_outwards_f32(n_p, p, settings->lower, settings->upper, dp);
+    }
+    if (solution->blocked != 0u) {
+        solution->bounded = true;
+        return;
+    }
+    const float part = pvid_step_shortening_f32(settings, size, &solution->limited);
     for (size_t a = 0; a < n_p; a++) {
         solution->p[a] = pvid_step_bounded_f32(settings, p, a, part * dp[a], &solution->bounded);
     }

@@ -27,6 +27,7 @@
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
 #include "solve/settings_f32.h"
+#include "solve/step_f32.h"
 #include "strong/differentiator_f32.h"
 
 /* The gate's scale averages over so long, or so many rows, because row_sd is only a guess. */
@@ -552,12 +553,54 @@ static inline pvid_reason move(strong_estimator_f32 *self, const float dp[STRONG
     return PVID_UPDATED;
 }
 
-/* Solves (S + H0) dp = rhs and moves p. In one place, for all schedules. */
-PVID_ALWAYS_INLINE pvid_reason solve(strong_estimator_f32 *self, const float rhs[STRONG_P])
+/* Parameters that a force or a step pulls out of their bounds. Equation (5) alone has no solution to stay at. */
+static PVID_COLD uint8_t outwards(const strong_estimator_f32 *self, const float pull[STRONG_P])
+{
+    const pvid_estimator_config_f32 *config = &self->config->estimator;
+    const bool stays = self->gain > 0.0f;
+    return stays ? pvid_step_outwards_f32(STRONG_P, self->p, config->lower, config->upper, pull) : 0u;
+}
+
+/* A step from a projection that would move a parameter out of its bound is not taken; the parameter is pinned in the
+ * next one. */
+static PVID_COLD bool is_blocked(strong_estimator_f32 *self, const float dp[STRONG_P])
+{
+    const uint8_t blocked = outwards(self, dp);
+    self->blocked = (uint8_t)((blocked != 0u) ? (blocked | (uint32_t)self->pinned) : 0u);
+    return blocked != 0u;
+}
+
+/* H0 with which pinned parameters are as good as known. */
+static PVID_COLD const float *raise_pinned(const strong_estimator_f32 *self, float prior[STRONG_P])
+{
+    size_t diagonal = 0; /* of the upper triangle by rows */
+    for (size_t a = 0; a < STRONG_P; a++) {
+        prior[a] =
+            pvid_step_has_f32(self->pinned, a) ? ((self->s[diagonal] + self->prior[a]) * PVID_PIN) : self->prior[a];
+        diagonal += STRONG_P - a;
+    }
+    return prior;
+}
+
+static PVID_COLD void hold_pinned(strong_estimator_f32 *self, float dp[STRONG_P])
+{
+    pvid_count_up(&self->counters.bounded);
+    for (size_t a = 0; a < STRONG_P; a++) {
+        dp[a] = pvid_step_has_f32(self->pinned, a) ? 0.0f : dp[a];
+    }
+}
+
+/* Solves (S + H0) dp = rhs and moves p; projected: rhs is of all rows. In one place, for all schedules. */
+PVID_ALWAYS_INLINE pvid_reason solve(strong_estimator_f32 *self, const float rhs[STRONG_P], bool projected)
 {
     float dp[STRONG_P];
-    pvid_reason reason = solved(self->s, self->prior, self->config->estimator.kappa_min, rhs, dp);
-    if (reason == PVID_UPDATED) {
+    float raised[STRONG_P];
+    const float *prior = (self->pinned != 0u) ? raise_pinned(self, raised) : self->prior;
+    pvid_reason reason = solved(self->s, prior, self->config->estimator.kappa_min, rhs, dp);
+    if (self->pinned != 0u) {
+        hold_pinned(self, dp);
+    }
+    if ((reason == PVID_UPDATED) && !(projected && (self->counters.bounded > 0u) && is_blocked(self, dp))) {
         reason = move(self, dp);
     }
     return (reason == PVID_UPDATED) ? reason : pvid_count_held(&self->counters, reason);
@@ -573,7 +616,11 @@ static inline void project_all(strong_estimator_f32 *self, const strong_gradient
     gather(self, self->in_block, self->s, force);
     PVID_UNROLL
     for (size_t a = 0; a < STRONG_P; a++) {
-        rhs[a] = (self->gain * (force[a] + own[a])) + ((1.0f - self->gain) * rhs[a]);
+        force[a] += own[a];
+        rhs[a] = (self->gain * force[a]) + ((1.0f - self->gain) * rhs[a]);
+    }
+    if (self->counters.bounded > 0u) {
+        self->pinned = (uint8_t)(outwards(self, force) | (uint32_t)self->blocked);
     }
 }
 
@@ -668,7 +715,7 @@ PVID_ALWAYS_INLINE pvid_reason step(strong_estimator_f32 *self, const strong_gra
         memcpy(self->force, rhs, sizeof rhs);
         return PVID_ACCUMULATED;
     }
-    return solve(self, rhs);
+    return solve(self, rhs, now != LAZY_STEP);
 }
 
 /* ---- rows ---- */

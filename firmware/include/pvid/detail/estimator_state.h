@@ -4,7 +4,7 @@
 
 #include "pvid/estimator.h"
 
-/* What the step and the assessment need beside the normal equations; written by init alone. */
+/* What the step and the assessment need beside the normal equations; written by init alone, but for `blocked`. */
 typedef struct {
     float prior[PVID_MAX_P];    /* diagonal of H0 [units of S] */
     float start_sd[PVID_MAX_P]; /* as in the configuration, with the fields below */
@@ -19,6 +19,7 @@ typedef struct {
     float dead_zone;  /* square of the configured one */
     uint8_t n_p;      /* parameters */
     uint8_t positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a]; PVID_MAX_P <= 8 */
+    uint8_t blocked;  /* bit a set: p[a] was at its bound, and the last solve would have moved it outwards */
 } pvid_solve_settings_f32;
 
 /* The normal equations of a solve and the residuals at p, gathered from the sums (estimator.h):
@@ -91,6 +92,7 @@ struct pvid_estimator_solve_f32 {
     uint8_t end;   /* behind its last one */
     bool ends_group;
     bool in_dead_zone; /* within the dead zone: no step is taken */
+    uint8_t pinned;    /* bit a: p[a] stays at its bound */
     float gain;        /* g of this solve */
     float fall;        /* decrease of rr by the step */
     float scale;       /* sum of M_ii dtheta_i^2: size of the terms that cancel in `fall` */

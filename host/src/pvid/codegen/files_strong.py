@@ -61,6 +61,8 @@ typedef struct {{
     uint8_t age;             /* rows in the sums since the last fold */
     uint8_t in_block;        /* rows in `block` */
     bool mixes;              /* gain < 1 */
+    uint8_t pinned;          /* bit a: p[a] stays at its bound until the next projection, */
+    uint8_t blocked;         /* because the last one would have moved it outwards */
     pvid_counters counters;
     float block[4][{upper}_ATOMS]; /* rows that are not in the sums yet, and the present one */
     float high[{upper}_SUMS];      /* the value of a sum is high + low */
