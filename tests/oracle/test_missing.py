@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
+from scipy.special import stdtrit
 
 from bench.lacking import (
     EFFECTS,
@@ -28,6 +29,7 @@ from bench.mechanisms import design_of, start_of
 from bench.plants import PLANTS
 from pvid.models.mechanisms import compiled_of, names
 from pvid.oracle.weak.identify import Identified, identify
+from pvid.oracle.weak.missing import _student
 from pvid.oracle.weak.terms import ACTS, Recorded
 from pvid.oracle.weak.verdict import Verdict
 from pvid.sim.imperfections import Imperfections
@@ -287,3 +289,8 @@ def test_what_no_term_explains_has_no_name() -> None:
     assert found.verdict.status == "warning" and "sensor" not in [one.name for one in found.verdict.reasons]
     assert found.named is None or not found.named.complete
     assert np.all(np.abs(found.p - simulation_of("battery_2rc").truth) < 4 * found.se)
+
+
+@pytest.mark.parametrize("freedom", [1.5, 9, 36.5, 20_000])
+def test_what_hardly_happens_by_chance_is_students_quantile(freedom: float) -> None:
+    assert _student(freedom) == pytest.approx(-stdtrit(freedom, 1e-8), rel=1e-6)

@@ -18,7 +18,7 @@ from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.rows import Compiled, WeakRows, record_of
 from pvid.oracle.weak.solve import batch
-from pvid.oracle.weak.whitener import Whitener
+from pvid.oracle.weak.whitener import Whitener, holders
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation, simulation_of
 
@@ -94,7 +94,8 @@ def test_low_rank_whitening_is_that_of_each_windows_covariance() -> None:
     root = rng.normal(size=(7, 7))
     covariance = root @ root.T
     directions = rng.normal(size=(5, 3, 7)) * np.array([1.0, 1e3, 0.0])[:, np.newaxis]
-    whitener = Whitener.of_covariance(covariance, directions)
+    held = holders(np.repeat(np.arange(5), 3), np.arange(15))
+    whitener = Whitener.of_covariance(covariance, 5, directions.reshape(15, 7), held)
     eye = np.broadcast_to(np.eye(7), (5, 7, 7))
     factor = whitener.of(eye).transpose(0, 2, 1)
     total = np.zeros((7, 7))

@@ -68,6 +68,7 @@ def test_log_determinant_is_that_of_every_windows_covariance() -> None:
     (white,) = fit.white
     theta = fit.parameters.theta(fit.p)
     plain = fit.rows.covariance((0,), theta, fit.errors)
-    directions = fit.rows.directions((0,), theta)
-    expected = sum(np.linalg.slogdet(plain + u.T @ u)[1] for u in directions)
+    directions, (entries, windows) = fit.rows.reversals.directions((0,), theta), fit.rows.doubts((0,))
+    held = (directions[entries[windows == window]] for window in range(fit.rows.windows))
+    expected = sum(np.linalg.slogdet(plain + u.T @ u)[1] for u in held)
     np.testing.assert_allclose(white.whitener.log_determinant(), expected, rtol=0, atol=1e-3)  # but for the ridge

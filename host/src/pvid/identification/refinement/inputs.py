@@ -12,6 +12,7 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.codegen.refine import RefineFunctions
 from pvid.design.second_derivative import second_derivative
+from pvid.identification.refinement.spline import ORDER, Spline
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Integral, Jet, jets, sgn
 from pvid.oracle.weak.channels import broadcast, evaluated
@@ -24,7 +25,6 @@ Float = npt.NDArray[np.float64]
 EDGE = 1.25  # times the drive's: the pass band
 HIGHEST = 0.25  # of the sample rate: a pass band that its filter is exact in to 1e-5
 _FEWEST = 12  # values of a second derivative: its spline is of order five
-_ORDER = 5  # of splines
 _ROUNDING = 1e-9  # [s]: of times
 
 
@@ -76,20 +76,19 @@ class Curve:
 
     Parameters
     ----------
-    pieces : times [s] since the first sample, and values there, of each stretch
+    pieces : equally spaced times [s] since the first sample, and values there, of each stretch
     """
 
     def __init__(self, pieces: Iterable[tuple[Float, Float]]) -> None:
-        from scipy.interpolate import PPoly, make_interp_spline  # takes a quarter of a second
-
-        # as polynomials four times faster
-        splines = [(times, PPoly.from_spline(make_interp_spline(times, values, k=5))) for times, values in pieces]
-        self._pieces = [(times[0], times[-1], one, one.derivative()) for times, one in splines]
+        self._pieces = [
+            (times[0], times[-1], Spline(float(times[0]), float(times[-1] - times[0]) / (len(times) - 1), values))
+            for times, values in pieces
+        ]
 
     @classmethod
     def of(cls, x: Float, rate: float) -> Curve:
         """Through the samples x [n], NaN where there is none."""
-        there = [(first, end) for first, end in zip(*stretches(np.isfinite(x)), strict=True) if end - first > _ORDER]
+        there = [(first, end) for first, end in zip(*stretches(np.isfinite(x)), strict=True) if end - first > ORDER]
         return cls((np.arange(first, end) / rate, x[first:end]) for first, end in there)
 
     @classmethod
@@ -114,9 +113,9 @@ class Curve:
     def __call__(self, t: Float, late: float = 0.0, slope: bool = False) -> Float:
         """Values, or slopes, at rising times t + late [s]; NaN where t is beyond its stretches."""
         out = np.full(t.shape, np.nan)
-        for begin, end, value, derivative in self._pieces:
+        for begin, end, spline in self._pieces:
             part = slice(*np.searchsorted(t, [begin - _ROUNDING, end + _ROUNDING]))
-            out[part] = (derivative if slope else value)(np.clip(t[part] + late, begin, end))
+            out[part] = spline(np.clip(t[part] + late, begin, end), slope)
         return out
 
 

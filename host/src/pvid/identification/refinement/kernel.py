@@ -5,23 +5,14 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.resources import files
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.recent import Recent
-from pvid.codegen.files_refine import DOUBLE, function
-from pvid.codegen.refine import (
-    RefinedParameter,
-    RefineFunctions,
-    is_driven_by_derivatives,
-    refine_functions_of,
-    signs_of,
-    width_of,
-    without_optional,
-)
+from pvid.codegen.refine import RefinedParameter, signs_of, width_of, without_optional
+from pvid.identification.refinement.kernel_text import printed
 from pvid.model.compiled import CompiledModel
 from pvid.sim.compiled_plant import loaded
 
@@ -48,8 +39,8 @@ class RefinedKernel:
     """
 
     def __init__(self, model: CompiledModel) -> None:
-        made = refine_functions_of(model, None, is_driven_by_derivatives(model))
-        self._library = loaded(_code(made, any(one.edge == "before" for one in model.signals)))
+        made, code = printed(model)
+        self._library = loaded(code)
         widths = tuple(width_of(model, one) for one in signs_of(model))
         self.widths = list(range(len(made.parameters), len(made.parameters) + len(widths)))
         self.made = replace(made, parameters=(*made.parameters, *widths), settings=made.settings[len(widths) :])
@@ -319,41 +310,6 @@ class TogetherKernel(RefinedKernel):
 def _pointer(array: Float) -> ctypes.c_void_p:
     assert array.dtype == np.float64 and array.flags.c_contiguous
     return array.ctypes.data_as(ctypes.c_void_p)
-
-
-def _code(made: RefineFunctions, read_before: bool) -> str:
-    counts = {
-        "N": len(made.coordinates),
-        "ORDER": made.order,
-        "NU": len(made.inputs),
-        "NZ": len(made.outputs),
-        "NM": made.moving - made.skew,
-        "NT": len(made.parameters) - made.moving,
-        "SKEW": int(made.skew),
-        "NS": dict(made.functions["signs"].written)["g"] if "signs" in made.functions else 0,
-        "WIDTHS": len(made.parameters),
-        "READ_BEFORE": int(read_before),
-        "NUMBER_OF_CONSTANTS": len(made.constants),
-    }
-    jacobian = [key for key, _ in made.functions["jacobian"].written]
-    arrays = ", ".join(f"double *{key}" for key in jacobian)
-    export = [
-        f"void refine_derivatives(const double *r, const double *q, const double *v, const double *u, {arrays}) "
-        f"{{ double m[NUMBER_OF_CONSTANTS + 1]; pvid_refine_constants(r, m); "
-        f"pvid_refine_jacobian(m, q, v, u, {', '.join(jacobian)}); }}",
-    ]
-    export += ["int refine_region(const double *r) { return pvid_refine_region(r); }"]
-    if "chart" in made.functions:
-        export.append("void refine_chart(const double *r, double *row) { pvid_refine_chart(r, row); }")
-    return "\n".join(
-        [
-            "#include <math.h>\n#include <stdbool.h>",
-            *(f"#define {name} {value}" for name, value in counts.items()),
-            *(function(one, DOUBLE) for one in made.functions.values()),
-            (files("pvid.identification.refinement") / "refinement.c").read_text(encoding="utf-8"),
-            *export,
-        ]
-    )
 
 
 _made = Recent(RefinedKernel, 32)

@@ -96,9 +96,10 @@ def moments_of(fit: Fit, designs: list[Float]) -> tuple[Float, Float]:
         back = white.whitener.back(d.transpose(0, 2, 1))
         r1 = fit.rows.with_next(white.kinds, theta, fit.errors)
         neighbours += flat(back[adjacent] @ r1) @ flat(back[adjacent + 1]).T
-        if fit.rows.places.size:
-            in_doubt = fit.rows.directions(white.kinds, theta) @ back.transpose(0, 2, 1)
-            neighbours += fit.rows.reversals.shared(in_doubt, fit.rows.places)
+        entries, windows = fit.rows.doubts(white.kinds)
+        directions = fit.rows.reversals.directions(white.kinds, theta)
+        in_doubt = np.einsum("er,enr->en", directions[entries], back[windows])
+        neighbours += fit.rows.reversals.shared(entries, in_doubt)
     return information, neighbours
 
 

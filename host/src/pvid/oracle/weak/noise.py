@@ -15,6 +15,7 @@ from pvid.model.signals import Integral, jets
 from pvid.oracle.weak.channels import Channels, Record, broadcast
 from pvid.oracle.weak.front import density
 from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.whitener import Holders, holders
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,8 @@ class ReversalNoise:
     ----------
     windows : of each entry, rising [entries]; an entry is a reversal in one of the two windows that hold it
     events : reversal of each entry [entries]
-    shapes : of each row kind, 2 sd chi^(order) of the columns that hold sgn [entries, columns, K]
+    columns : of each row kind, those that hold sgn
+    shapes : of each row kind, 2 sd chi^(order) of these [entries, columns, K]
     """
 
     def __init__(self, channels: Channels, record: Record) -> None:
@@ -277,52 +279,50 @@ class ReversalNoise:
             first += len(signs.times)
         order = np.argsort(np.concatenate(windows), kind="stable")
         self.windows, self.events = np.concatenate(windows)[order], np.concatenate(events)[order]
-        self.shapes = [np.concatenate(own)[order] for own in shapes]
+        whole = [np.concatenate(own)[order] for own in shapes]
+        self.columns = [np.flatnonzero(own.any(axis=(0, 2))) for own in whole]
+        self._thetas = [row.thetas for row in channels.rows]
+        self.shapes = [own[:, columns] for own, columns in zip(whole, self.columns, strict=True)]
 
     def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
         """In the rows of some kinds, one standard deviation long [entries, K of each kind]."""
         return np.concatenate(
-            [np.einsum("ejk,j->ek", self.shapes[kind], np.append(theta[kind], -1.0)) for kind in kinds], axis=1
+            [
+                np.einsum("ejk,j->ek", self.shapes[kind], np.append(theta[kind], -1.0)[self.columns[kind]])
+                for kind in kinds
+            ],
+            axis=1,
         )
 
-    def places(self, windows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        """Entries of each of some windows, by their numbers [windows, most entries]; -1 where there are fewer."""
-        if not len(self.windows):
-            return np.zeros((len(windows), 0), np.int64)
-        first, behind = np.searchsorted(self.windows, windows), np.searchsorted(self.windows, windows + 1)
-        steps = np.arange(int(np.max(behind - first, initial=0)))
-        found = first[:, np.newaxis] + steps
-        return np.where(found < behind[:, np.newaxis], found, -1)
+    def holders(self, kinds: Sequence[int], numbers: npt.NDArray[np.int64]) -> list[Holders]:
+        """Which of some windows, by their numbers, hold which entries that stand in the rows of some kinds."""
+        there = np.any([self.shapes[kind].any(axis=(1, 2)) for kind in kinds], axis=0)
+        there &= np.isin(self.windows, numbers)
+        entries = np.flatnonzero(there)
+        return holders(np.searchsorted(numbers, self.windows[entries]), entries)
 
-    def slopes(self, kinds: Sequence[int], pulled: Float, places: npt.NDArray[np.int64]) -> Float:
+    def slopes(self, kinds: Sequence[int], entries: npt.NDArray[np.int64], pulled: Float) -> Float:
         """1/2 tr(R^-1 d covariance / d theta) over some windows [thetas of the kinds].
 
         Parameters
         ----------
-        pulled : R^-1 times the directions of each window [windows, entries, R]
-        places : of those entries
+        pulled : R^-1 times the directions of these entries [n, R]
         """
         k = self.shapes[0].shape[2]
-        there = places >= 0
-        own = pulled[there]
-        return np.concatenate(
-            [
-                np.einsum("ejk,ek->j", self.shapes[kind][places[there], :-1], own[:, place * k : (place + 1) * k])
-                for place, kind in enumerate(kinds)
-            ]
-        )
+        out = [np.zeros(self._thetas[kind] + 1) for kind in kinds]
+        for place, (kind, own) in enumerate(zip(kinds, out, strict=True)):
+            pull = pulled[:, place * k : (place + 1) * k]
+            own[self.columns[kind]] = np.einsum("ejk,ek->j", self.shapes[kind][entries], pull)
+        return np.concatenate([own[:-1] for own in out])
 
-    def shared(self, scores: Float, places: npt.NDArray[np.int64]) -> Float:
+    def shared(self, entries: npt.NDArray[np.int64], scores: Float) -> Float:
         """Sum over the reversals that two neighbours hold of the earlier's score times the later's [n, n].
 
         Parameters
         ----------
-        scores : of each entry of each window [windows, entries, n]
-        places : of those entries
+        scores : of these entries [entries, n]
         """
-        there = places >= 0
-        entries, own = places[there], scores[there]
         order = np.lexsort((self.windows[entries], self.events[entries]))
-        entries, own = entries[order], own[order]
+        entries, own = entries[order], scores[order]
         pairs = np.flatnonzero(self.events[entries][1:] == self.events[entries][:-1])
         return np.asarray(own[pairs].T @ own[pairs + 1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from pvid.oracle.weak.front import grid_of, samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.noise import NoiseFilters, NoiseModel, ReversalNoise
 from pvid.oracle.weak.parameters import Parameters
-from pvid.oracle.weak.whitener import Whitener
+from pvid.oracle.weak.whitener import Holders, Whitener
 from pvid.oracle.weak.work import of_pass
 from pvid.rig.run import NUMBER
 
@@ -61,6 +61,27 @@ class EquationError:
 
     variance: float = 0.0
     order: int = 0
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What a theta leaves of one row kind: residuals with unit covariance, nuisances projected out.
+
+    Attributes
+    ----------
+    residuals : [windows, K]
+    whitener : of every window
+    free : rows less nuisances, of all windows
+    """
+
+    residuals: Float
+    whitener: Whitener
+    free: int
+
+    @property
+    def unlikelihood(self) -> float:
+        """Minus twice the logarithm of their likelihood, but for a constant."""
+        return float(np.sum(self.residuals**2)) + self.whitener.log_determinant() * self.free / self.residuals.size
 
 
 @dataclass(frozen=True)
@@ -179,6 +200,7 @@ class WeakRows:
         self.noise = NoiseModel(compiled.filters, record)
         self.reversals = ReversalNoise(compiled.channels, record)
         alone = [(kind,) for kind in range(len(columns))]
+        self._holders: dict[tuple[int, ...], list[Holders]] = {}
         self.groups: list[tuple[int, ...]] = [tuple(range(len(columns)))] if record.grid.design.joint else [*alone]
 
     @classmethod
@@ -214,6 +236,7 @@ class WeakRows:
         out = copy.copy(self)
         out.columns = [one[windows] for one in self.columns]
         out.numbers, out.recordings = self.numbers[windows], self.recordings[windows]
+        out._holders = {}
         return out
 
     def parts(self, count: int) -> npt.NDArray[np.int64]:
@@ -249,23 +272,27 @@ class WeakRows:
             )
         return np.block(blocks)
 
-    @property
-    def places(self) -> npt.NDArray[np.int64]:
-        """Entries of `reversals` in each window."""
-        return self.reversals.places(self.numbers)
+    def holders(self, kinds: tuple[int, ...]) -> list[Holders]:
+        """Windows that hold entries of `reversals` in rows of these kinds."""
+        if kinds not in self._holders:
+            self._holders[kinds] = self.reversals.holders(kinds, self.numbers)
+        return self._holders[kinds]
 
-    def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
-        """Of located reversals, one standard deviation long [windows, entries, R]."""
-        places = self.places
-        if not places.size:
-            return np.zeros((*places.shape, len(kinds) * self.functions.count))
-        out = self.reversals.directions(kinds, theta)[np.maximum(places, 0)]
-        out[places < 0] = 0.0
-        return out
+    def doubts(self, kinds: tuple[int, ...]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """Entries of `reversals` in rows of these kinds, and the window that holds each."""
+        entries, windows = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        for one in self.holders(kinds):
+            there = one.entries >= 0
+            entries.append(one.entries[there])
+            windows.append(np.repeat(one.windows, there.sum(axis=1)))
+        return np.concatenate(entries), np.concatenate(windows)
 
-    def whitener(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Whitener:
+    def whitener(self, kinds: tuple[int, ...], theta: Sequence[Float], errors: Sequence[EquationError]) -> Whitener:
         """Of the covariance of every window; rows of a model without noise are scaled to their size."""
-        r = self.covariance(kinds, theta, errors)
+        directions = self.reversals.directions(kinds, theta) if self.holders(kinds) else None
+        return self._whitener(kinds, self.covariance(kinds, theta, errors), directions)
+
+    def _whitener(self, kinds: tuple[int, ...], r: Float, directions: Float | None) -> Whitener:
         k = self.functions.count
         diagonal = np.diag(r).reshape(len(kinds), k).mean(axis=1)
         for place, kind in enumerate(kinds):
@@ -274,9 +301,30 @@ class WeakRows:
                 own = slice(place * k, (place + 1) * k)
                 r[own, own] += diagonal[place] * self.functions.gram(0, 0)
         r = r + np.diag(np.repeat(_RIDGE * diagonal, k))
-        return Whitener.of_covariance(r, self.directions(kinds, theta))
+        return Whitener.of_covariance(r, self.windows, directions, self.holders(kinds))
 
-    def white(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> WhiteRows:
+    def unexplained(self, kind: int, theta: Sequence[Float]) -> Callable[[EquationError], Unexplained]:
+        """What a theta leaves of one kind, by the error of its equation: what does not depend on it is formed once."""
+        kinds, k, thetas = (kind,), self.functions.count, self.compiled.channels.rows[kind].thetas
+        columns = self.columns[kind]
+        left = columns[:, thetas] - np.tensordot(columns[:, :thetas], theta[kind], (1, 0))
+        nuisances = columns[:, thetas + 1 :]
+        plain = self.covariance(kinds, theta, [EquationError()] * self.kinds)
+        directions = self.reversals.directions(kinds, theta) if self.holders(kinds) else None
+
+        def under(error: EquationError) -> Unexplained:
+            gram = self.functions.gram(error.order, error.order)
+            whitener = self._whitener(kinds, plain + error.variance * gram, directions)
+            e = whitener.of(left[:, np.newaxis])
+            gone = 0
+            if nuisances.shape[1]:
+                q, gone = _basis(whitener.of(nuisances))
+                e -= (e @ q) @ q.transpose(0, 2, 1)
+            return Unexplained(e[:, 0], whitener, self.windows * k - gone)
+
+        return under
+
+    def white(self, kinds: tuple[int, ...], theta: Sequence[Float], errors: Sequence[EquationError]) -> WhiteRows:
         """Whitened rows of a group at the thetas of all kinds."""
         whitener = self.whitener(kinds, theta, errors)
         k, plans = self.functions.count, [self.compiled.channels.rows[kind] for kind in kinds]
@@ -286,12 +334,9 @@ class WeakRows:
         nuisances = _joined([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)])
         gone = 0
         if nuisances.shape[1]:
-            q, r = np.linalg.qr(nuisances.transpose(0, 2, 1))
-            live = np.abs(np.diagonal(r, axis1=1, axis2=2)) > 1e-12 * np.max(np.abs(r), axis=(1, 2))[:, np.newaxis]
-            q = q * live[:, np.newaxis]
+            q, gone = _basis(nuisances)
             regressors = regressors - (regressors @ q) @ q.transpose(0, 2, 1)
             known = known - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, known))
-            gone = int(live.sum())
         return WhiteRows(tuple(kinds), regressors, known, whitener, self.windows * len(kinds) * k - gone)
 
     def white_nuisances(self, kinds: Sequence[int], whitener: Whitener) -> Float:
@@ -306,6 +351,14 @@ class WeakRows:
         if firsts:
             chosen = [one[:, first:] for one, first in zip(chosen, firsts, strict=True)]
         return [whitener.of(one, slice(place * k, (place + 1) * k)) for place, one in enumerate(chosen)]
+
+
+def _basis(nuisances: Float) -> tuple[Float, int]:
+    """Of what nuisances [windows, nuisances, R] span [windows, R, nuisances], and how many dimensions that has in all
+    windows."""
+    q, r = np.linalg.qr(nuisances.transpose(0, 2, 1))
+    live = np.abs(np.diagonal(r, axis1=1, axis2=2)) > 1e-12 * np.max(np.abs(r), axis=(1, 2))[:, np.newaxis]
+    return q * live[:, np.newaxis], int(live.sum())
 
 
 def _joined(columns: Sequence[Float]) -> Float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from pvid.oracle.weak import work
 from pvid.oracle.weak.failures import FAILURES
-from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.functions import Float, TestFunctions
 from pvid.oracle.weak.parameters import Parameters
-from pvid.oracle.weak.rows import EquationError, WeakRows, WhiteRows
+from pvid.oracle.weak.rows import EquationError, Unexplained, WeakRows, WhiteRows
 
 RIDGE = 1e-13  # added to the unit diagonal of what is inverted
 _STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
@@ -287,7 +287,10 @@ def resumed(rows: WeakRows, fit: Fit, passes: int) -> Fit:
     for turn in range(passes + 1):
         work.spend(rows.work)
         theta = parameters.theta(p)
-        errors = [sharpened(rows, k, theta, one, 1) if one.variance else one for k, one in enumerate(errors)]
+        errors = [
+            sharpened(rows.unexplained(k, theta), rows.functions, one, 1) if one.variance else one
+            for k, one in enumerate(errors)
+        ]
         white = [rows.white(group, theta, errors) for group in rows.groups]
         if turn < passes:
             p, _ = gauss_newton(parameters, compensated(rows, white, theta), p, prior, 3)
@@ -315,8 +318,8 @@ def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) 
             ]
             pulls.append(np.sum(own, axis=0)[: len(theta[kind])])
         moments.b[place] += np.concatenate(pulls)
-        if rows.places.size:
-            moments.b[place] += rows.reversals.slopes(one.kinds, one.whitener.inverse_of_directions(), rows.places)
+        if one.whitener.alike:
+            moments.b[place] += rows.reversals.slopes(one.kinds, *one.whitener.inverse_of_directions())
     return moments
 
 
@@ -329,7 +332,7 @@ def improved(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationEr
     """The equation's error at a pass of the search for p."""
     if turn in _SEARCHES:
         return error_of(rows, kind, theta)
-    return sharpened(rows, kind, theta, last, 1) if last.variance else last
+    return sharpened(rows.unexplained(kind, theta), rows.functions, last, 1) if last.variance else last
 
 
 def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError:
@@ -339,14 +342,15 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError
     independent z_i of variances 1 + v q_i. That is where a variance starts; orders are compared with the weights of
     each window, reversals and all.
     """
-    plain = rows.white((kind,), theta, [EquationError()] * rows.kinds)
-    e = plain.residuals(theta)
+    under = rows.unexplained(kind, theta)
+    plain = under(EquationError())
+    e = plain.residuals
     best, gain = EquationError(), _EVIDENCE
     # What the projection on the complement of the nuisances took out of the residuals.
-    share = plain.free / (rows.windows * rows.functions.count)
+    share = plain.free / e.size
     moment = e.T @ e / (len(e) * share)
     whitener = plain.whitener.base
-    without = _unlikely(plain, e)
+    without = plain.unlikelihood
     for order in range(rows.compiled.channels.rows_top(kind) + 1):
         white = whitener @ rows.functions.gram(order, order) @ whitener.T
         if not np.isfinite(white).all():  # sensors of no size that a number holds
@@ -357,37 +361,33 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError
         v, rise = most_likely(q, z)
         if rise * len(e) * share < _HINT:
             continue
-        found = sharpened(rows, kind, theta, EquationError(v, order))
+        found = sharpened(under, rows.functions, EquationError(v, order))
         # Neighbours share half of their samples: rows count half.
-        rise = (without - unlikely(rows, kind, theta, found)) / 2
+        rise = (without - under(found).unlikelihood) / 2
         if rise > gain:
             best, gain = found, rise
     return best
 
 
-def unlikely(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError) -> float:
-    """Minus twice the logarithm of the likelihood of one kind's residuals, but for a constant."""
-    white = rows.white((kind,), theta, [error] * rows.kinds)
-    return _unlikely(white, white.residuals(theta))
-
-
-def _unlikely(white: WhiteRows, e: Float) -> float:
-    return float(np.sum(e**2)) + white.whitener.log_determinant() * white.free / e.size
-
-
 def sharpened(
-    rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError, steps: int = _SHARPENING
+    under: Callable[[EquationError], Unexplained],
+    functions: TestFunctions,
+    error: EquationError,
+    steps: int = _SHARPENING,
 ) -> EquationError:
     """The variance with the weights of each window in place of their mean.
 
     Where the likelihood is at its maximum, sum e^T R^-1 Q R^-1 e = sum tr(R^-1 Q): v is scaled by their ratio.
+
+    Parameters
+    ----------
+    under : what is left of the kind, by the error of its equation
     """
-    q = rows.functions.gram(error.order, error.order)
+    q = functions.gram(error.order, error.order)
     for _ in range(steps):
-        errors = [error] * rows.kinds
-        white = rows.white((kind,), theta, errors)
-        e = white.residuals(theta)
-        ratio = white.whitener.energy(q, e) / (white.whitener.trace(q) * white.free / e.size)
+        left = under(error)
+        e = left.residuals
+        ratio = left.whitener.energy(q, e) / (left.whitener.trace(q) * left.free / e.size)
         error = EquationError(error.variance * ratio, error.order)
         if abs(ratio - 1) < 1e-3:
             break

@@ -34,7 +34,8 @@ def as_white_force(fit: Fit) -> Float | None:
     for _ in range(_PASSES):
         theta = parameters.theta(p)
         errors = [
-            sharpened(rows, kind, theta, one) if fit.errors[kind].order else one for kind, one in enumerate(errors)
+            sharpened(rows.unexplained(kind, theta), rows.functions, one) if fit.errors[kind].order else one
+            for kind, one in enumerate(errors)
         ]
         white = [rows.white(group, theta, errors) for group in rows.groups]
         p, size = gauss_newton(parameters, compensated(rows, white, theta), p, prior, _STEPS)

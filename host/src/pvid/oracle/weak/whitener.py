@@ -12,6 +12,7 @@ Of a window with more directions than rows, as where a friction sticks, V is rep
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,28 +22,53 @@ from pvid.oracle.weak.functions import Float
 
 
 @dataclass(frozen=True)
-class _Alike:
-    """Windows with about as many directions; r is the largest number of theirs.
+class Holders:
+    """Windows that hold about as many directions; r is the largest number of theirs.
 
     Attributes
     ----------
     windows : their places [w]
-    entries : places of each one's directions among those of its window [w, r]
+    entries : of the directions of each [w, r], -1 where it has fewer
+    """
+
+    windows: npt.NDArray[np.int64]
+    entries: npt.NDArray[np.int64]
+
+
+def holders(windows: npt.NDArray[np.int64], entries: npt.NDArray[np.int64]) -> list[Holders]:
+    """From the window of each direction, rising, and its entry [directions]."""
+    own, first, count = np.unique(windows, return_index=True, return_counts=True)
+    octave = np.frexp(count - 0.5)[1]
+    padded = np.append(entries, -1)
+    out = []
+    for alike in (np.flatnonzero(octave == one) for one in np.unique(octave)):
+        steps = np.arange(count[alike].max())
+        there = steps < count[alike, np.newaxis]
+        out.append(Holders(own[alike], padded[np.where(there, first[alike, np.newaxis] + steps, -1)]))
+    return out
+
+
+@dataclass(frozen=True)
+class _Alike:
+    """The directions of windows that hold about as many.
+
+    Attributes
+    ----------
+    held : by which windows
     whole : L^-1 U_w [w, R, r]
     v : the same, or a factor of as many directions as there are rows where r is larger [w, R, min(r, R)]
     small : B [w, r', r'], r' = min(r, R)
     inner : K^-1 [w, r', r']
     """
 
-    windows: npt.NDArray[np.int64]
-    entries: npt.NDArray[np.int64]
+    held: Holders
     whole: Float
     v: Float
     small: Float
     inner: Float
 
     @classmethod
-    def of(cls, windows: npt.NDArray[np.int64], entries: npt.NDArray[np.int64], whole: Float) -> _Alike:
+    def of(cls, held: Holders, whole: Float) -> _Alike:
         """From their directions."""
         v = whole
         if v.shape[2] > v.shape[1]:
@@ -50,18 +76,20 @@ class _Alike:
         one = np.eye(v.shape[2])
         k = np.linalg.cholesky(one + v.transpose(0, 2, 1) @ v)
         inner = np.linalg.inv(k)
-        return cls(windows, entries, whole, v, inner.transpose(0, 2, 1) @ np.linalg.inv(one + k), inner)
+        return cls(held, whole, v, inner.transpose(0, 2, 1) @ np.linalg.inv(one + k), inner)
 
     def only(self, kept: npt.NDArray[np.int64]) -> _Alike:
         """Of some of all windows, at their new places."""
-        there = np.isin(self.windows, kept)
+        there = np.isin(self.held.windows, kept)
+        held = Holders(np.searchsorted(kept, self.held.windows[there]), self.held.entries[there])
         whole, v, small, inner = (one[there] for one in (self.whole, self.v, self.small, self.inner))
-        return _Alike(np.searchsorted(kept, self.windows[there]), self.entries[there], whole, v, small, inner)
+        return _Alike(held, whole, v, small, inner)
 
     def turn(self, y: Float, transposed: bool = False) -> None:
         """(I - V B^T V^T) y of these windows' part of y [windows, columns, R], or its transpose; in place."""
         small = self.small.transpose(0, 2, 1) if transposed else self.small
-        y[self.windows] -= ((y[self.windows] @ self.v) @ small) @ self.v.transpose(0, 2, 1)
+        windows = self.held.windows
+        y[windows] -= ((y[windows] @ self.v) @ small) @ self.v.transpose(0, 2, 1)
 
     def shrunk(self) -> Float:
         """V K^-T [w, R, r'], whose square is V (I + V^T V)^-1 V^T."""
@@ -75,34 +103,30 @@ class Whitener:
     Attributes
     ----------
     base : L^-1 [R, R]
-    shape : of the directions [windows, most directions of one, R]
-    alike : windows with directions
+    windows : how many
+    alike : those with directions
     """
 
     base: Float
-    shape: tuple[int, int, int]
+    windows: int
     alike: tuple[_Alike, ...]
 
     @classmethod
-    def of_covariance(cls, covariance: Float, directions: Float) -> Whitener:
-        """From R [R, R] and the directions of each window [windows, most, R], zeros where there are fewer."""
+    def of_covariance(
+        cls, covariance: Float, windows: int, directions: Float | None = None, held: Sequence[Holders] = ()
+    ) -> Whitener:
+        """From R [R, R] and the directions [entries, R] of the windows that hold any."""
         base = np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.float64)
-        there = directions.any(axis=2)
-        count = there.sum(axis=1)
-        first = np.argsort(~there, axis=1, kind="stable")
-        octave = np.frexp(count - 0.5)[1]
         alike = []
-        for one in np.unique(octave[count > 0]):
-            windows = np.flatnonzero((octave == one) & (count > 0))
-            entries = first[windows, : count[windows].max()]
-            own = directions[windows[:, np.newaxis], entries]
-            alike.append(_Alike.of(windows, entries, base @ own.transpose(0, 2, 1)))
-        return cls(base, directions.shape, tuple(alike))
+        if directions is not None and held:
+            turned = np.append(directions @ base.T, np.zeros((1, len(base))), axis=0)  # entry -1: none
+            alike = [_Alike.of(one, turned[one.entries].transpose(0, 2, 1)) for one in held]
+        return cls(base, windows, tuple(alike))
 
     def only(self, windows: slice | npt.NDArray[np.bool_]) -> Whitener:
         """Of some of the windows."""
-        kept = np.arange(self.shape[0])[windows]
-        return replace(self, shape=(len(kept), *self.shape[1:]), alike=tuple(one.only(kept) for one in self.alike))
+        kept = np.arange(self.windows)[windows]
+        return replace(self, windows=len(kept), alike=tuple(one.only(kept) for one in self.alike))
 
     def of(self, x: Float, rows: slice = slice(None)) -> Float:
         """L_w^-1 x_w for each of several columns x [windows, columns, R]; those that fill some rows only are short."""
@@ -121,28 +145,30 @@ class Whitener:
     def total_inverse(self) -> Float:
         """Sum over the windows of R_w^-1 [R, R]."""
         rows = len(self.base)
-        total = self.shape[0] * np.eye(rows)
+        total = self.windows * np.eye(rows)
         for one in self.alike:
             flat = one.shrunk().transpose(1, 0, 2).reshape(rows, -1)
             total -= flat @ flat.T
         return np.asarray(self.base.T @ total @ self.base)
 
-    def inverse_of_directions(self) -> Float:
-        """R_w^-1 U_w as rows, as in `shape`."""
-        out = np.zeros(self.shape)
+    def inverse_of_directions(self) -> tuple[npt.NDArray[np.int64], Float]:
+        """Entries [n], and R_w^-1 U_w of each [n, R]."""
+        entries, out = [np.zeros(0, np.int64)], [np.zeros((0, len(self.base)))]
         for one in self.alike:
             inside = one.shrunk()
             if one.whole.shape == one.v.shape:
                 rows = inside @ one.inner
             else:
                 rows = one.whole - inside @ (inside.transpose(0, 2, 1) @ one.whole)
-            out[one.windows[:, np.newaxis], one.entries] = rows.transpose(0, 2, 1) @ self.base
-        return out
+            there = one.held.entries >= 0
+            entries.append(one.held.entries[there])
+            out.append(rows.transpose(0, 2, 1)[there] @ self.base)
+        return np.concatenate(entries), np.concatenate(out)
 
     def log_determinant(self) -> float:
         """Sum over the windows of log det R_w."""
         inner = [np.diagonal(one.inner, axis1=1, axis2=2) for one in self.alike]
-        return -2 * (self.shape[0] * _logarithms(np.diag(self.base)) + sum(map(_logarithms, inner)))
+        return -2 * (self.windows * _logarithms(np.diag(self.base)) + sum(map(_logarithms, inner)))
 
     def trace(self, q: Float) -> float:
         """Sum over the windows of tr(R_w^-1 Q)."""
