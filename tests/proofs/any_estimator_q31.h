@@ -163,6 +163,7 @@ static inline void any_state(const pvid_model_q31 *model, pvid_estimator_q31 *se
     any_formats(self);
     self->settings.n_p = model->n_p;
     self->settings.positive = (uint8_t)model->positive;
+    self->settings.blocked = (uint8_t)any_u32(0, 255);
     self->settings.row_sd = any_i32(1, INT32_MAX);
     self->settings.gain = any_i32(0, PVID_ONE_Q30);
     self->settings.correlation = any_u32((uint32_t)1 << 16, (uint32_t)1 << 31);

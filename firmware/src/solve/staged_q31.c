@@ -171,7 +171,7 @@ static uint32_t outwards(const pvid_estimator_q31 *self, const int64_t force[])
 {
     uint32_t bits = 0;
     for (size_t a = 0; a < self->model->n_p; a++) {
-        bits |= (uint32_t)(is_held_by(self, a, force[a]) ? 1u : 0u) << a;
+        bits |= is_held_by(self, a, force[a]) ? ((uint32_t)1u << a) : 0u;
     }
     return bits;
 }

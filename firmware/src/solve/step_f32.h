@@ -68,14 +68,18 @@ static inline float pvid_step_bounded_f32(const pvid_solve_settings_f32 *setting
 
 #define PVID_PIN 1048576.0f /* 2^20: what a pinned parameter still takes from another is rounding */
 
+static inline bool pvid_step_is_held_f32(float p, float lower, float upper, float pull)
+{
+    return ((p <= lower) && (pull < 0.0f)) || ((p >= upper) && (pull > 0.0f));
+}
+
 /* Parameters that are at a bound from which `pull` moves them outwards, a bit for each. */
 static inline uint8_t pvid_step_outwards_f32(size_t n, const float p[], const float lower[], const float upper[],
                                              const float pull[])
 {
     uint32_t outwards = 0;
     for (size_t a = 0; a < n; a++) {
-        const bool out = ((p[a] <= lower[a]) && (pull[a] < 0.0f)) || ((p[a] >= upper[a]) && (pull[a] > 0.0f));
-        outwards |= (uint32_t)(out ? 1u : 0u) << a;
+        outwards |= pvid_step_is_held_f32(p[a], lower[a], upper[a], pull[a]) ? ((uint32_t)1u << a) : 0u;
     }
     return (uint8_t)outwards;
 }
