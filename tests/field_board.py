@@ -18,11 +18,11 @@ import numpy as np
 from pendulum_plant import simulate, standard_sensors
 from pendulum_run import Run
 
+from bench.liar_board import estimate_of
 from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number
 from pvid.codegen.weak_library import weak_native
-from pvid.core.weak_native import WeakIdentifier
 from pvid.link import frames as link
 from pvid.log.mechanism import LogMechanism
 from pvid.log.rig import mechanism_in
@@ -112,21 +112,6 @@ def hello(session: int = 7, **values: Any) -> link.Hello:
     return link.Hello(**{**said, **values})
 
 
-def estimate_of(identifier: WeakIdentifier, session: int, reason: int) -> link.Estimate:
-    """What a board reports of it."""
-    published = identifier.estimate
-    return link.Estimate(
-        session=session,
-        updates=identifier.counters["updates"],
-        p=(*map(float, published["p"]), *[0.0] * (link.MAX_P - len(published["p"]))),
-        covariance=link.upper_triangle(published["covariance"]),
-        kappa=float(published["kappa"]),
-        residual_sd=float(published["residual_sd"]),
-        weight=float(published["weight"]),
-        reason=reason,
-    )
-
-
 def messages(field: Field, session: int = 7) -> Iterator[tuple[int, link.Message]]:
     """(tick, message) in the order in which a board sends them."""
     run, own = field.run, board()
@@ -156,7 +141,9 @@ def messages(field: Field, session: int = 7) -> Iterator[tuple[int, link.Message
             verdict = next((int(one) for one in reasons[::-1] if one != Reason.ACCUMULATED), verdict)
             done = field.first_tick + end
             if field.estimate_every and end % field.estimate_every == 0:
-                yield done, estimate_of(identifier, session, verdict)
+                updates = identifier.counters["updates"]
+                given = {"session": session, "updates": updates, "reason": verdict}
+                yield done, estimate_of(identifier.estimate, link.Estimate, **given)
             if field.hash_every and end % field.hash_every == 0:
                 yield done, link.Hash(session, hash=identifier.running_hash, sample_hash=sample_hash)
 

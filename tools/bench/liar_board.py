@@ -104,6 +104,20 @@ def _settings() -> int:
     return settings_number(board())
 
 
+def estimate_of(own: Any, frame: type[Kind], **values: Any) -> Kind:
+    """The frame of an estimate as a core has it."""
+    names = {one.name for one in fields(frame)}
+    values |= {name: padded(own[name]) for name in names & {"p", "se"}}
+    values |= {name: link.upper_triangle(own[name]) for name in names & {"covariance", "correlation"}}
+    values |= {name: own[name].item() for name in ("kappa", "residual_sd", "weight")}
+    return frame(**values)
+
+
+def padded(row: Any) -> tuple[Any, ...]:
+    """As many numbers as a frame has."""
+    return tuple(np.resize(np.append(row, np.zeros(MAX_P, np.asarray(row).dtype)), MAX_P).tolist())
+
+
 @cache
 def _honest_run() -> tuple[tuple[int, Message], ...]:
     """(tick, message) of a board that does what it should, with the bits of the core on this machine."""
@@ -121,18 +135,8 @@ def _honest_run() -> tuple[tuple[int, Message], ...]:
         for tick in range(first, first + CHECK_EVERY, PER_FRAME):
             raw = Raw.of_values(*samples[tick : tick + PER_FRAME].T)
             sent.append((tick, replace(raw, session=SESSION)))
-        assessed = identifier.estimate
-        estimate = message(
-            Estimate,
-            session=SESSION,
-            updates=identifier.counters["updates"],
-            p=(*map(float, assessed["p"]), *[0.0] * (MAX_P - len(assessed["p"]))),
-            covariance=link.upper_triangle(assessed["covariance"]),
-            kappa=float(assessed["kappa"]),
-            residual_sd=float(assessed["residual_sd"]),
-            weight=float(assessed["weight"]),
-            reason=int(record.reason[-1]),
-        )
+        updates, reason = identifier.counters["updates"], int(record.reason[-1])
+        estimate = estimate_of(identifier.estimate, Estimate, session=SESSION, updates=updates, reason=reason)
         hashed = message(
             Hash, session=SESSION, hash=identifier.running_hash, sample_hash=int(of_samples[first + CHECK_EVERY - 1])
         )

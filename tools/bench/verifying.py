@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from bench.liar_board import estimate_of, padded
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.strong_board import StrongBoard
 from pvid.link import frames as link
-from pvid.link.frames import MAX_P
 from pvid.log.file import LogWriter
 from pvid.log.verify import ReplayableBoard
 from pvid.log.witness import CoreWitness
@@ -60,21 +60,17 @@ def messages(board: Any, ticks: int) -> Iterator[tuple[int, link.Message]]:
         if len(piece) < EVERY:
             return
         done, own = first + EVERY, core.estimate()
-        values: dict[str, Any] = {"p": _padded(own["p"]), board.matrix: link.upper_triangle(own[board.matrix])}
-        values |= {"se": _padded(own["se"])} if fixed else {}
-        values |= {name: own[name].item() for name in ("kappa", "residual_sd", "weight")}
-        yield done, estimate(session=configure.session, updates=core.updates, reason=core.verdict, **values)
+        yield done, estimate_of(own, estimate, session=configure.session, updates=core.updates, reason=core.verdict)
         if (refined := core.refined()) is not None:
-            values = {"p": _padded(refined.best["p"]), "covariance": link.upper_triangle(refined.best["covariance"])}
-            values |= {name: _padded(refined.latest[name]) for name in ("r", "se")}
+            values: dict[str, Any] = {
+                "p": padded(refined.best["p"]),
+                "covariance": link.upper_triangle(refined.best["covariance"]),
+            }
+            values |= {name: padded(refined.latest[name]) for name in ("r", "se")}
             values |= {name: refined.latest[name] for name in ("number", "level", "clash")}
             values |= {"reason": refined.told, "stage": refined.stage, "tick_high": 0}
             yield done, link.RefinedEstimate(session=configure.session, **values)
         yield done, link.Hash(configure.session, hash=core.running_hash, sample_hash=int(hashes[done - 1]))
-
-
-def _padded(row: Any) -> tuple[Any, ...]:
-    return tuple(np.resize(np.append(row, np.zeros(MAX_P, np.asarray(row).dtype)), MAX_P).tolist())
 
 
 def write_log(board: Any, ticks: int, path: Path) -> None:

@@ -17,8 +17,8 @@ from pvid.base.units import Scale, scale_to, spelled
 from pvid.identification.wild_samples import MOST_FAR, far_from_median
 from pvid.models.mechanisms import described
 from pvid.models.registry import names as shipped_names
-from pvid.rig.columns import TIME, Channel, Column, Columns, MissingColumnError, unit_in, unit_in_brackets
-from pvid.rig.gaps import holds_changes
+from pvid.rig.columns import TIME, Channel, Column, Columns, MissingColumnError, typed, unit_in, unit_in_brackets
+from pvid.rig.gaps import at_its_ends, holds_changes
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import LONG_BLANK_ROWS, MIN_ROWS, Recording, read_table, recording_of_table
 from pvid.rig.sensor_steps import resolution_of
@@ -168,13 +168,6 @@ def _with_time(path: Path, names: tuple[str, ...], at: int) -> Survey:
     return Survey(path, names, at, "t" if time == "t=t" else time, read.recording, tuple(facts))
 
 
-def typed(names: Sequence[str], k: int) -> str:
-    """A column as --columns names it: its name, or its position from 1 where this is no name that can be typed."""
-    name = names[k]
-    plain = name.isprintable() and not set(name) & set("=,:'\"") and names.count(name) == 1 and not name.isdecimal()
-    return name if plain else str(k + 1)
-
-
 @dataclass(frozen=True, eq=False)
 class _Read:
     """Columns of numbers by their position from 1: as written, and on one clock; the units that the file states, and
@@ -190,7 +183,7 @@ class _Read:
 def _read(path: Path, names: Sequence[str], at: int, others: Sequence[int]) -> _Read:
     def reading(which: Sequence[int]) -> _Read:
         channels = tuple(Channel(str(k + 1), "") for k in which)
-        named = {str(k + 1): Column(typed(names, k)) for k in which} | {"t": Column(typed(names, at))}
+        named = {str(k + 1): Column(_name_of(names, k)) for k in which} | {"t": Column(_name_of(names, at))}
         columns = _AsWritten(channels, named)
         table = read_table(path, columns)
         unit = "" if columns.stated.get("t") else unit_in(names[at], "s") or _unit_of_epoch(table.t)
@@ -217,6 +210,11 @@ def _read(path: Path, names: Sequence[str], at: int, others: Sequence[int]) -> _
     if not readable:
         raise refusal
     return replace(reading(readable), unread=unread)
+
+
+def _name_of(names: Sequence[str], k: int) -> str:
+    """As Column has it."""
+    return typed(names, k).strip('"')
 
 
 def _unit_of_epoch(t: Float) -> str:
@@ -283,8 +281,8 @@ def _clipped(x: Float, unit: str) -> list[str]:
     begins = np.concatenate([[0], np.flatnonzero(np.diff(x)) + 1])
     lengths, held = np.diff(begins, append=len(x)), x[begins]
     found = []
-    for end, word in ((x.max(), "largest"), (x.min(), "smallest")):
-        own = lengths[held == end]
+    for end, word, firsts, ends in at_its_ends(x):
+        own = ends - firsts
         elsewhere = lengths[held != end]
         usual = np.quantile(elsewhere, _AT_THE_END) if len(elsewhere) else np.inf
         long = own[(own >= _CLIPPED_SAMPLES) & (own > 2 * usual)]

@@ -86,12 +86,11 @@ def _outputs_of(
     model: Description | CompiledModel, known: Mapping[str, float]
 ) -> Callable[[Mapping[str, float], Float], Errors]:
     """See LogMechanism.outputs_at."""
-    from pvid.model.evaluation import numpy_function
+    from pvid.model.evaluation import with_slopes
 
     used = [one for one in model.unknowns if any(output.value.has(one.symbol) for output in model.outputs)]
-    values = [one.value for one in model.outputs]
-    slopes = [[value.diff(one.symbol) for one in used] for value in values]
-    function = numpy_function([one.symbol for one in (*used, *model.knowns)], [values, slopes])
+    symbols = [tuple(one.symbol for one in some) for some in (used, model.knowns)]
+    function = with_slopes(tuple(one.value for one in model.outputs), *symbols)
     constants = [known[one.name] for one in model.knowns]
 
     @np.errstate(all="ignore")  # a board may send any number

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,3 +21,11 @@ def numpy_function(symbols: Sequence[sp.Symbol], expressions: Any) -> Callable[.
         symbols, expressions, modules=[{"numpy": np}], printer=NumPyPrinter, cse=True
     )
     return function
+
+
+@lru_cache(maxsize=256)
+def with_slopes(
+    values: tuple[sp.Expr, ...], by: tuple[sp.Symbol, ...], beside: tuple[sp.Symbol, ...] = ()
+) -> Callable[..., Any]:
+    """A function of two groups of symbols: values, and their slopes by those of the first group [values, by]."""
+    return numpy_function([*by, *beside], [list(values), [[value.diff(one) for one in by] for value in values]])

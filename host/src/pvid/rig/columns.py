@@ -59,6 +59,7 @@ _USUAL_NAMES = {
 
 _UNIT_AT_END = re.compile(r"(?:^|[\s_.\-/(\[])(?P<unit>[a-zµμ°]+)[)\]]?\s*$", re.I)
 _IN_BRACKETS = re.compile(r"[\[(](?P<unit>[^\[\]()]+)[\])]\s*$")
+_LONG = 24  # characters of a name that is typed
 _PART = re.compile(r'(?:[^,"]|"(?:[^"]|"")*"?)+')
 _ASSIGNED = re.compile(
     r'\s*(?P<signal>[^=]*?)\s*=\s*(?:"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<name>[^":].*?))'
@@ -232,10 +233,7 @@ class Columns:
                 parts.append(f"{signal}=NAME:{unit or 1}")
                 continue
             taken.add(place)
-            name = names[place]
-            plain = name.isprintable() and len(name) <= 24 and not set(name) & set("='\"")
-            typed = (f'"{name}"' if set(name) & set(",:") else name) if plain else place + 1
-            parts.append(f"{signal}={typed}:{unit_in(name, unit) or unit or 1}")
+            parts.append(f"{signal}={typed(names, place)}:{unit_in(names[place], unit) or unit or 1}")
         text = ",".join(parts)
         return text if re.fullmatch(r"[\w=:,.\-]+", text, re.ASCII) else f"'{text}'"
 
@@ -285,6 +283,16 @@ def _scale(si: str, text: str) -> Scale | None:
     except ValueError:
         return None
     return Scale(number) if math.isfinite(number) and number > 0.0 else None
+
+
+def typed(names: Sequence[str], k: int) -> str:
+    """A column as --columns names it: its name, in double quotes where this has a comma or a colon; its position from 1
+    where this is no name that can be typed, or long."""
+    name = names[k]
+    can_be_typed = name.isprintable() and not set(name) & set("='\"") and len(name) <= _LONG
+    if not can_be_typed or names.count(name) > 1 or name.isdecimal():
+        return str(k + 1)
+    return f'"{name}"' if set(name) & set(",:") else name
 
 
 def unit_in(name: str, si: str) -> str | None:

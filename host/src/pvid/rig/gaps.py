@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,12 @@ def stretches(flags: BoolArray) -> tuple[IntArray, IntArray]:
     outside = np.zeros(1, np.int8)
     edges = np.flatnonzero(np.diff(np.concatenate([outside, flags.view(np.int8), outside])))
     return edges[::2], edges[1::2]
+
+
+def at_its_ends(x: FloatArray) -> Iterator[tuple[float, str, IntArray, IntArray]]:
+    """The largest and the smallest value of a signal, in a word, and the stretches in which it stands there."""
+    for end, word in ((float(np.nanmax(x)), "largest"), (float(np.nanmin(x)), "smallest")):
+        yield end, word, *stretches(x == end)
 
 
 def longest_stretch(flags: BoolArray) -> slice:
