@@ -34,7 +34,7 @@ def test_a_mechanism_is_identified_compared_and_streamed(
 def test_a_refined_estimate_lacks_what_the_linear_rows_lack_only_beyond_what_they_neglect() -> None:
     model = SimpleNamespace(refinement=SimpleNamespace(equations=("full",)), knowns={}, signals=())
     lacking = SimpleNamespace(shifts=np.array([[0.1, -0.3, 0.3]]))
-    found = SimpleNamespace(lacking=lacking, shifts=None, by_neglect=np.array([0.2, 0.2, 0.2]))
+    found = SimpleNamespace(shifts=lacking.shifts, by_neglect=np.array([0.2, 0.2, 0.2]))
     np.testing.assert_array_equal(refined_shifts_of(model, found), [[0.0, -0.3, 0.3]])  # type: ignore[arg-type]
 
 

@@ -9,7 +9,7 @@ import pytest
 from pvid.design.second_derivative import second_derivative
 from pvid.identification.refinement.fit import GOOD, Cut
 from pvid.identification.refinement.inputs import HIGHEST, drive_edge_hz
-from pvid.identification.refinement.kernel import PlayedKernel, kernel_of
+from pvid.identification.refinement.kernel import Drive, PlayedKernel, kernel_of
 from pvid.identification.refinement.problem import RefinedMechanism, refine_mechanism
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
@@ -28,7 +28,7 @@ def test_derivatives_are_those_of_finite_differences(name: str) -> None:
     r = np.array([truth.get(one.name, 0.1) for one in made.parameters] + [0.5 for _ in made.settings])
     u, du = rng.normal(size=(2, 600, 3, len(made.inputs)))
     first, starts = np.array([0, 200], np.int32), 0.1 * rng.normal(size=(2, kernel.states))
-    _, found, _ = kernel.blocks(r, first, 300, 1, 2e-3, u, du, starts)
+    _, found, _ = kernel.blocks(r, first, 300, Drive(1, 2e-3, u, du), starts)
     assert found is not None
     for column in range(kernel.columns):
         ends = []
@@ -41,7 +41,7 @@ def test_derivatives_are_those_of_finite_differences(name: str) -> None:
                 driven = u + sign * du
             else:
                 near[entry] += sign * (r[entry] if made.parameters[entry].log else 1.0)
-            ends.append(kernel.blocks(near, first, 300, 1, 2e-3, driven, du, begun, False)[0])
+            ends.append(kernel.blocks(near, first, 300, Drive(1, 2e-3, driven, du), begun, False)[0])
         wanted = (ends[0] - ends[1]) / 2e-5
         near_enough = 0.1 if entry in kernel.widths else 1e-5  # a width's derivative is a difference itself
         np.testing.assert_allclose(found[..., column], wanted, atol=near_enough * np.abs(wanted).max() + 1e-9)
@@ -68,7 +68,7 @@ def test_derivatives_with_a_play_are_those_of_finite_differences() -> None:
     r = np.array([values.get(name, 0.0) for name in (*names, *kernel.made.settings)])
     starts, first = np.array([[0.1, 0.25, 0.3, -0.2]]), np.zeros(1, np.int32)
     u = np.zeros((1500, 3, 1))
-    z, found, _ = kernel.blocks(r, first, 1500, 1, 1e-3, u, u, starts)
+    z, found, _ = kernel.blocks(r, first, 1500, Drive(1, 1e-3, u, u), starts)
     assert found is not None and 0.05 < np.mean(np.diff(z[0, :, 0]) == 0) < 0.5
     for name in ("w", "d1", "d2", "k1", "c", "play"):
         place, ends = names.index(name), []
@@ -76,7 +76,7 @@ def test_derivatives_with_a_play_are_those_of_finite_differences() -> None:
         for sign in (1e-6, -1e-6):
             near = r.copy()
             near[place] += sign * unit
-            ends.append(kernel.blocks(near, first, 1500, 1, 1e-3, u, u, starts, False)[0])
+            ends.append(kernel.blocks(near, first, 1500, Drive(1, 1e-3, u, u), starts, False)[0])
         wanted = ((ends[0] - ends[1]) / 2e-6)[..., 0].ravel()
         far = np.abs(found[0, :, 0, kernel.states + place] - wanted) > 1e-5 * np.abs(wanted).max()
         assert far.mean() < 0.02, name

@@ -22,7 +22,7 @@ from pvid.identification.answer import Analysis
 from pvid.identification.core import identify_in_c
 from pvid.identification.core_refined import BothStages, compare_refined, refined_in_c
 from pvid.identification.refinement.inputs import inputs_of
-from pvid.identification.refinement.kernel import kernel_of
+from pvid.identification.refinement.kernel import Drive, kernel_of
 from pvid.identification.refinement.problem import refine_mechanism
 from pvid.model import Integral, Model, sgn, sin
 from pvid.model.compiled import CompiledModel
@@ -131,7 +131,8 @@ def test_readings_and_rates_solve_the_equations(kind: Callable[[], CompiledModel
     kernel, (r, state, u) = kernel_of(compiled), start_of_kind(compiled)
     made = kernel.made
     held = np.tile(u, (2, 3, 1))
-    z = kernel.blocks(r, np.array([0], np.int32), 1, 1, 1e-9, held, np.zeros_like(held), state[None], False)[0][0, 0]
+    drive = Drive(1, 1e-9, held, np.zeros_like(held))
+    z = kernel.blocks(r, np.array([0], np.int32), 1, drive, state[None], False)[0][0, 0]
     v = state[len(made.coordinates) :] if made.order == 2 else np.zeros(1)
     rates = kernel.derivatives(r, state[: len(made.coordinates)], v, u)["a"]
     jets = [Jet(*_split(name)) for name in made.coordinates]
@@ -161,7 +162,7 @@ def test_derivatives_by_start_and_parameters_are_those_of_the_readings(kind: Cal
     kernel, (r, state, u) = kernel_of(compiled), start_of_kind(compiled)
     made, samples, sub = kernel.made, 8, 4
     inputs = np.random.default_rng(1).uniform(-1, 1, (samples * sub, 1, len(u))) * np.ones((1, 3, 1)) + u
-    given = np.array([0], np.int32), samples, sub, 1e-4, inputs, np.zeros_like(inputs)
+    given = np.array([0], np.int32), samples, Drive(sub, 1e-4, inputs, np.zeros_like(inputs))
     jacobian = kernel.blocks(r, *given, state[None])[1]
     assert jacobian is not None
 

@@ -13,8 +13,7 @@ from pvid.identification.answer import Analysis
 from pvid.identification.refinement import problem as refinement
 from pvid.identification.refinement.adoption import refined_answer
 from pvid.identification.refinement.fit import Cut, Prior, Problem, Refined, refined
-from pvid.identification.refinement.kernel import kernel_of
-from pvid.identification.refinement.problem import longest_that_fits, problem_of, start_of
+from pvid.identification.refinement.problem import longest_that_fits, problem_of
 from pvid.rig.run import Recording
 from pvid.sim.simulated_run import simulation_of
 
@@ -66,7 +65,7 @@ def test_signs_are_widened_no_further_than_they_explain_the_run(
     simulation = simulation_of("dc_motor")
     model, run = simulation.model, simulation.run(1)
     p = np.array([simulation.rig.truth[name] for name in model.p_names])
-    problem, r = problem_of(model, run, simulation.rig.sample_rate, start_of(kernel_of(model), p))
+    problem, r = problem_of(model, run, simulation.rig.sample_rate, p)
     widths: list[float] = []
 
     def worse(self: Problem, r: Any, prior: Any, cut: Any, starts: Any, use: Any, **given: Any) -> Refined:

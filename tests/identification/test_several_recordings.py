@@ -18,7 +18,7 @@ from pvid.identification.judge import judged
 from pvid.identification.refinement.adoption import refined_answer
 from pvid.identification.refinement.inputs import inputs_of
 from pvid.identification.refinement.kernel import kernel_of
-from pvid.identification.refinement.problem import problem_of, start_of
+from pvid.identification.refinement.problem import problem_of
 from pvid.identification.refinement.search import refine
 from pvid.identification.road import identified
 from pvid.identification.validation import predicted
@@ -130,7 +130,7 @@ def test_derivatives_by_own_parameters_are_those_of_their_recording() -> None:
     loaded = both(pushed(3), pushed(4, m=1.3))
     model = with_own(SPRING, ["m", "x0"], ["A", "B"])
     p = np.array([1.0, 1.3, 1.0, 50.0, 0.01, 0.02])
-    problem, r = problem_of(model, loaded.run, RATE, start_of(kernel_of(model), p))
+    problem, r = problem_of(model, loaded.run, RATE, p)
     cut = problem.cut(400)
     starts = problem.first_starts(cut, r)
     block = problem.block(r, cut, starts, problem.used(cut))

@@ -12,7 +12,6 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import inflation
-from pvid.oracle.weak.front import step_weights_of, weights_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.rows import EquationError, WeakRows
@@ -72,8 +71,8 @@ def design_tables(
         power=design.power,
         decimation=design.decimation,
         hop=design.hop,
-        filter=tuple(_filter(weights_of(design, one.order)) for one in model.jet),
-        compensator=tuple(_filter(step_weights_of(design, one.order)) for one in model.jet),
+        filter=tuple(_filter(design.weights(one.order)) for one in model.jet),
+        compensator=tuple(_filter(design.step_weights(one.order)) for one in model.jet),
         circle=circle_of(design.hop),
         noise=tuple(entry for kind in range(rows.kinds) for entry in _noise(rows, kind, p)),
         error_order=np.array([one.order for one in found], np.uint8),

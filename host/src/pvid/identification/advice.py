@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -14,10 +14,11 @@ from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.together import with_own
 from pvid.oracle.weak import work
-from pvid.oracle.weak.choice import score_of
+from pvid.oracle.weak.choice import Scored, score_of
+from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.identify import allowance_of, neglected, ready
+from pvid.oracle.weak.identify import neglected, ready
 from pvid.rig.columns import Columns
 from pvid.rig.mechanism_file import channels_of
 
@@ -73,7 +74,7 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
             value = float(np.nanmin(run[one.name]))
             shown = with_unit(value, one.unit, 3) if value else "0"
             return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
-    with work.limited(_OF_ANALYSIS * allowance_of(answer.model, run, answer.recording.sample_rate)):
+    with work.limited(_OF_ANALYSIS * answer.found.allowance):
         found = list(_tried(answer)) or list(_turned(answer))
     least = min((left for left, _, _ in found), default=0.0)
     # A linear mechanism moves alike with the other sign of its input and of its sensor.
@@ -91,11 +92,11 @@ def _unit_of_time(answer: Analysis) -> str | None:
     """
     if _distance(answer, answer.found.p) < _FAR:
         return None
-    model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
+    design = answer.found.design
     for unit in _TIMES:
-        scale = float(Columns.parse(f"t=t:{unit}", channels_of(answer.model))["t"].in_si(np.ones(1))[0])
+        scale = _scale(answer, "t", unit)
         other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
-        one = score_of(model, signals, other, None, False)
+        one = _score(answer, design=other)
         if one is not None and one.known and _distance(answer, one.p) < _NEAR:
             return unit
     return None
@@ -130,29 +131,26 @@ def _turned(answer: Analysis) -> Iterator[tuple[float, str, str]]:
 
 def _tried(answer: Analysis) -> Iterator[tuple[float, str, str]]:
     """Part of the residuals that is left by a mistake which explains the run, its sentence, and what to type."""
-    model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
-    before = score_of(model, signals, design, None, False)
+    model, signals, before = answer.model, answer.recording.run, _score(answer)
     far = before is None or _distance(answer, before.p) > _FAR or _is_beyond_equations(answer)
     for signal in sorted(answer.model.signals, key=lambda one: one.kind != "input"):
         name = signal.name
         for said, unit, most in _mistakes(signal, signals[name]):
-            typed = f"{name}={name}:{unit}"
-            scale = float(Columns.parse(typed, channels_of(answer.model))[name].in_si(np.ones(1))[0])
+            scale = _scale(answer, name, unit)
             # Noise is scaled with its signal: a signal that is small beside its noise fits any equations.
-            scaled = model if abs(scale) == 1 else ready(_with_noise(answer.model, name, abs(scale)))
-            one = score_of(scaled, {**signals, name: scale * signals[name]}, design, None, False)
+            scaled = model if abs(scale) == 1 else _with_noise(model, name, abs(scale))
+            one = _score(answer, scaled, {**signals, name: scale * signals[name]})
             if one is None or not one.known or _distance(answer, one.p) > _NEAR:
                 continue
             left = one.chi2 / before.chi2 if before is not None else 0.0
             implausible = far or (scale < 0 and before is not None and not before.known)
             if left < (most if implausible else _PART):
-                yield left, said, typed
+                yield left, said, f"{name}={name}:{unit}"
 
 
 def _of_own(answer: Analysis) -> str | None:
     """Of several recordings: which parameter explains them if each has its own; the one that leaves least."""
-    model, run, design = answer.model, answer.recording.run, answer.found.design
-    before = score_of(ready(model), run, design, None, False)
+    model, before = answer.model, _score(answer)
     if before is None or not answer.recording.origins:
         return None
     names = [one.name for one in answer.recording.origins]
@@ -160,13 +158,29 @@ def _of_own(answer: Analysis) -> str | None:
     left = {}
     for name in model.alone.p_names:
         if name not in own:
-            one = score_of(ready(with_own(model.alone, own | {name}, names)), run, design, None, False)
+            one = _score(answer, with_own(model.alone, own | {name}, names))
             if one is not None and one.known:
                 left[name] = one.chi2 / before.chi2
     best = min(left, key=lambda name: left[name], default="")
     if not best or left[best] > max(_PART, min(0.5, _DIFFER / before.chi2)):
         return None
     return f"the recordings differ in {best}: --own {best} gives each its own"
+
+
+def _score(
+    answer: Analysis,
+    model: CompiledModel | None = None,
+    run: Mapping[str, Float] | None = None,
+    design: WeakDesign | None = None,
+) -> Scored | None:
+    """The estimate from the guesses on by the weights of the sensors, with another model, run or design."""
+    of_run = answer.recording.run if run is None else run
+    return score_of(ready(model or answer.model), of_run, design or answer.found.design, None, False)
+
+
+def _scale(answer: Analysis, name: str, unit: str) -> float:
+    """What a column in this unit is multiplied by."""
+    return float(Columns.parse(f"{name}={name}:{unit}", channels_of(answer.model))[name].in_si(np.ones(1))[0])
 
 
 def _with_noise(model: CompiledModel, name: str, scale: float) -> CompiledModel:

@@ -18,8 +18,7 @@ from pvid.model.together import offsets, with_own
 from pvid.oracle.weak import work
 from pvid.oracle.weak.edges import with_edges
 from pvid.oracle.weak.failures import attempted
-from pvid.oracle.weak.identify import Identified, allowance_of
-from pvid.oracle.weak.identify import identify as identified_by
+from pvid.oracle.weak.identify import Identified, identify
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.run import Recording
 
@@ -47,11 +46,11 @@ def analysed(
     model = with_edges(as_sampled(model, recording.ticks_between), recording.run, recording.sample_rate)
     names = [one.name for one in recording.origins]
     whole = with_own(model, own, names)
-    found = identified_by(whole, recording.run, recording.sample_rate, weights=weights)
+    found = identify(whole, recording.run, recording.sample_rate, weights=weights)
     if _collapsed(model, found) and (scaled := with_own_scales(model)) is not None:
         other = with_own(scaled, own, names)
-        with work.limited(_OF_SECOND * allowance_of(other, recording.run, recording.sample_rate)):
-            again = attempted(lambda: identified_by(other, recording.run, recording.sample_rate, weights=weights))
+        with work.limited(_OF_SECOND * found.allowance):
+            again = attempted(lambda: identify(other, recording.run, recording.sample_rate, weights=weights))
         if again is not None and _determined(again) > _determined(found):
             whole, found = other, again
     model = whole

@@ -20,7 +20,7 @@ from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.configuration.weak_q31 import weak_q31_to_identify
 from pvid.core.native import Publisher
 from pvid.identification.answer import Analysis, Answer, Value
-from pvid.identification.values import gains_of, noise_of, shifts_of, unless_held, values_of
+from pvid.identification.values import unless_held, values_of
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float
@@ -274,9 +274,8 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
     published = identifier.is_published
     ends = record.reason[~np.isin(record.reason, _WITHIN)]
     model, found = answer.model, answer.found
-    gains = gains_of(model, found)
     # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
-    wider = np.maximum(noise_of(model, found) / np.sqrt(np.diag(run.covariance)), 1.0)
+    wider = np.maximum(found.noise / np.sqrt(np.diag(run.covariance)), 1.0)
     covariance = run.covariance * np.outer(wider, wider)
     # A core searches logarithms: of what may be 0 it stays uncertain, and publishes nothing.
     by_analysis = not published and any(one.status == "near_zero" for one in found.judged)
@@ -285,13 +284,13 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
 
     # Where the analysis publishes another estimate of the same equations, its distance belongs to the model's part.
     apart = np.abs(found.p - run.p)
-    noise = np.hypot(noise_of(model, found), np.sqrt(np.diag(covariance)))
-    shifts = np.vstack([shifts_of(found), np.where(apart > _CLASH * noise, apart, 0.0)])
+    noise = np.hypot(found.noise, np.sqrt(np.diag(covariance)))
+    shifts = np.vstack([found.shifts, np.where(apart > _CLASH * noise, apart, 0.0)])
 
     def values(verdict: Verdict) -> Mapping[str, Value]:
         if by_analysis:
             return answer.values
-        return values_of(model, run.p, covariance, gains, judged, verdict, shifts)
+        return values_of(model, run.p, covariance, found.gains, judged, verdict, shifts)
 
     misfit = identifier.misfit
     core = CoreAnswer(
@@ -310,7 +309,7 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
         misfit=None if not published or np.isnan(misfit) else misfit,
         windows=int(len(ends)),
         hash=identifier.running_hash,
-        publications=_published(answer, run, gains, wider),
+        publications=_published(answer, run, found.gains, wider),
         by_analysis=by_analysis,
     )
     return replace(core, values=values(core.verdict))

@@ -25,13 +25,13 @@ from pvid.identification.refinement.fit import Problem, Refined, Stretch, refine
 from pvid.identification.refinement.problem import prior_about
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.identification.validation import Motion
-from pvid.identification.values import gains_of, noise_of, shifts_of, values_of_found
+from pvid.identification.values import values_of_found
 from pvid.oracle.weak import verdict, work
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.gate import gated
-from pvid.oracle.weak.identify import Identified, allowance_of, ready
+from pvid.oracle.weak.identify import Identified, ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
@@ -104,8 +104,7 @@ def judged(answer: Analysis) -> Analysis:
     if answer.is_explained:
         return answer
     try:
-        units = allowance_of(answer.model, answer.recording.run, answer.recording.sample_rate)
-        with np.errstate(all="ignore"), work.limited(_OF_ANALYSIS * units):
+        with np.errstate(all="ignore"), work.limited(_OF_ANALYSIS * answer.found.allowance):
             return _judged(answer)
     except FAILURES:  # the equations cannot be simulated on this run: the usual answer, as it is
         return answer
@@ -377,10 +376,10 @@ def _published(answer: Analysis, chosen: Candidate, usual: Candidate | None, ali
     found, model = answer.found, answer.model
     fit = chosen.fit.at(chosen.p)
     apart = np.array([one.p - chosen.p for one in alike])
-    shifts = np.concatenate([shifts_of(found), apart]) if chosen is usual else apart
+    shifts = np.concatenate([found.shifts, apart]) if chosen is usual else apart
     by_model = np.max(np.abs(shifts), axis=0)
-    noise = noise_of(model, found) if chosen is usual else chosen.se
-    se = np.sqrt(noise**2 + np.sum(gains_of(model, found) ** 2, axis=0) + by_model**2)
+    noise = found.noise if chosen is usual else chosen.se
+    se = np.sqrt(noise**2 + np.sum(found.gains**2, axis=0) + by_model**2)
     status = tuple(verdict.judged(model, fit, noise))
     r2 = list(found.r2.values()) if chosen is usual else uncertainty(fit).r2
     own = (*_OF_WIDTH, *(() if chosen is usual else _OF_USUAL))

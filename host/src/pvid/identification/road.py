@@ -41,7 +41,8 @@ def identified(
     PvidError
         When the recording is too short, or holds a signal beyond all reason.
     """
-    answer = advised(analysed(recording, model, weights, own))
+    answer = analysed(recording, model, weights, own)
+    answer = advised(answer)
     another_column = bool(answer.advice) and not answer.identified  # no estimate of this one can help
     if refine is None:
         refine = bool(model.refinement.equations) and weights == "residuals" and not recording.origins

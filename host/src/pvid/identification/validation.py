@@ -16,8 +16,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.identification.refinement.fit import Cut, Prior, Problem, Stretch, refined
-from pvid.identification.refinement.kernel import kernel_of
-from pvid.identification.refinement.problem import prior_about, problem_of, start_of
+from pvid.identification.refinement.problem import prior_about, problem_of
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
@@ -91,7 +90,7 @@ class Motion:
             Where the equations cannot be simulated: an input is a derivative that no recorded signal gives, or the
             recording is too short.
         """
-        return cls(*problem_of(model, signals, rate, start_of(kernel_of(model), p)))
+        return cls(*problem_of(model, signals, rate, p))
 
     @property
     def sd(self) -> Float:
@@ -100,7 +99,7 @@ class Motion:
 
     def r_of(self, p: Float) -> Float:
         """Parameters and settings of the simulation."""
-        r = start_of(self.problem.kernel, p)
+        r = self.problem.kernel.start(p)
         widths = self.problem.kernel.widths
         r[widths] = self._r[widths]
         return r

@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import sympy as sp
 
 from pvid.identification.answer import Value
 from pvid.model.compiled import CompiledModel, Output
-from pvid.model.evaluation import numpy_function
-from pvid.oracle.weak.identify import Identified, given
+from pvid.model.evaluation import with_slopes
+from pvid.oracle.weak.identify import Identified
 from pvid.oracle.weak.verdict import Judged, Verdict
 from pvid.oracle.weak.words import WIDE, Word, worst
 
@@ -25,40 +22,21 @@ Float = npt.NDArray[np.float64]
 def values_of_found(model: CompiledModel, found: Identified) -> dict[str, Value]:
     """Outputs of the model, then p, by name."""
     # The correlations of the rows, with the published standard errors but for gains and constants.
-    widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
+    widened = found.noise / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
-    return values_of(model, found.p, covariance, gains_of(model, found), found.judged, found.verdict, shifts_of(found))
-
-
-def noise_of(model: CompiledModel, found: Identified) -> Float:
-    """The published standard errors but for gains, constants and what is missing [n_p]."""
-    other = np.sum(gains_of(model, found) ** 2, axis=0) + found.by_model**2
-    return np.asarray(np.sqrt(np.maximum(found.se**2 - other, 0.0)))
-
-
-def shifts_of(found: Identified) -> Float:
-    """What p moves by with each term that the equations may lack, and to other estimates [terms, n_p]."""
-    if found.shifts is not None:
-        return found.shifts
-    return np.zeros((0, len(found.p))) if found.lacking is None else found.lacking.shifts
-
-
-def gains_of(model: CompiledModel, found: Identified) -> Float:
-    """What p is off by for one standard deviation of each gain, constant and clock that has any, and of what
-    linearised equations neglect [gains, n_p]."""
-    return np.array([*given(model, found.by_gain, found.by_known, found.by_clock), found.by_neglect])
+    return values_of(model, found.p, covariance, found.gains, found.judged, found.verdict, found.shifts)
 
 
 def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
-    """The same of a refined estimate, whose equations neglect nothing where the refinement has its own."""
-    return gains_of(model, found)[:-1] if model.refinement.equations else gains_of(model, found)
+    """`gains` of a refined estimate, whose equations neglect nothing where the refinement has its own."""
+    return found.gains[:-1] if model.refinement.equations else found.gains
 
 
 def refined_shifts_of(model: CompiledModel, found: Identified) -> Float:
-    """The same of a refined estimate: where the refinement has its own equations, what the linear rows lack counts only
+    """`shifts` of a refined estimate: where the refinement has its own equations, what the linear rows lack counts only
     where it is more than they neglect."""
-    shifts = shifts_of(found)
-    return np.where(np.abs(shifts) > found.by_neglect, shifts, 0.0) if model.refinement.equations else shifts
+    far = np.abs(found.shifts) > found.by_neglect
+    return np.where(far, found.shifts, 0.0) if model.refinement.equations else found.shifts
 
 
 def values_of(
@@ -77,10 +55,9 @@ def values_of(
     Parameters
     ----------
     covariance : of p by noise [n_p, n_p]
-    gains : see gains_of
+    gains, shifts : as Identified has them; no shifts: no terms were tried
     judged : of each parameter; an output is identified where all parameters that it depends on are
     verdict : whose word a parameter has; an output has the worst of those that it depends on
-    shifts : see shifts_of; None: no terms were tried
     of_known : the first of the gains are those of constants, in which an output may stand by itself
     """
     terms = np.zeros((0, len(p))) if shifts is None else shifts
@@ -135,17 +112,11 @@ def _of_constants(model: CompiledModel, p: Float, output: Output, value: float) 
     return off
 
 
-@lru_cache(maxsize=256)
-def _gradient(value: sp.Expr, p: tuple[sp.Symbol, ...]) -> Any:
-    """A function of p: the value, then its slopes."""
-    return numpy_function(p, [value, *(value.diff(symbol) for symbol in p)])
-
-
 def output_at(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:
     """Value at p and its gradient [n_p]; NaN where it does not exist at p."""
     value = model.with_knowns(output.value)
     with np.errstate(all="ignore"):
-        at, *slopes = (complex(one) for one in _gradient(value, model.p)(*p.astype(complex)))
-    if abs(at.imag) > 0:
+        (at,), (slopes,) = with_slopes((value,), model.p)(*p.astype(complex))
+    if abs(complex(at).imag) > 0:
         return float("nan"), np.full(len(p), np.nan)
-    return at.real, np.array(slopes).real
+    return complex(at).real, np.array(slopes, complex).real

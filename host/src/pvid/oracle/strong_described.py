@@ -23,10 +23,10 @@ from pvid.model.signals import Integral, Jet, jets, sgn
 from pvid.model.strong import strong_form
 from pvid.oracle.weak.channels import broadcast, running_integrals
 from pvid.oracle.weak.errors import clustered_variance
+from pvid.oracle.weak.filters import polynomial_weights
 from pvid.oracle.weak.front import filtered, of_hold, samples_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
-from pvid.oracle.weak.polynomials import polynomial_weights
 from pvid.oracle.weak.solve import inverse, solved
 
 _STEP_LIMIT = 0.3  # of log p, or of p over its reach

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.identification.refinement.kernel import RefinedKernel
+from pvid.identification.refinement.kernel import Drive, RefinedKernel
 
 Float = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
@@ -222,16 +222,15 @@ class Problem:
         units = np.where(self.log[chosen], p, 1.0)
         return p, found.covariance[np.ix_(chosen, chosen)] * np.outer(units, units)
 
-    def inputs(self, r: Float) -> tuple[Float, Float]:
-        """u and du as the sensors' skew in r has them."""
-        made = self.kernel.made
-        return self.measured.inputs(float(r[made.moving - 1]) if made.skew else 0.0)
+    def drive(self, r: Float) -> Drive:
+        """Inputs as the sensors' skew in r has them."""
+        made, m = self.kernel.made, self.measured
+        return Drive(m.sub, m.h, *m.inputs(float(r[made.moving - 1]) if made.skew else 0.0), m.coarse)
 
     def simulated(self, r: Float, cut: Cut, starts: Float) -> Float:
         """Readings [blocks, samples, outputs]."""
-        m = self.measured
         self._spend(cut, 1)
-        return self.kernel.blocks(r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, False, m.coarse)[0]
+        return self.kernel.blocks(r, cut.first, cut.samples, self.drive(r), starts, False)[0]
 
     def _spend(self, cut: Cut, columns: int) -> None:
         steps = len(cut.first) * cut.samples * self.measured.sub / self.measured.coarse
@@ -243,7 +242,7 @@ class Problem:
         m = self.measured
         self._spend(cut, 1 + (self.kernel.columns if move else self.kernel.states))
         z, jacobian, _ = self.kernel.blocks(
-            r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, True if move else "starts", m.coarse
+            r, cut.first, cut.samples, self.drive(r), starts, True if move else "starts"
         )
         assert jacobian is not None
         jacobian = jacobian if move else np.ascontiguousarray(jacobian[..., : self.kernel.states])
@@ -522,7 +521,7 @@ class Problem:
 
     def starts_along(self, r: Float, before: Refined, cut: Cut) -> Float:
         """Starts of other blocks, from the motion of those that are solved."""
-        m, old, u = self.measured, before.cut, self.inputs(r)
+        old, drive = before.cut, self.drive(r)
         out = np.empty((len(cut.first), self.kernel.states))
         begins = [first for first, _ in self.stretches]
 
@@ -537,8 +536,8 @@ class Problem:
             elif after < 0 or stretch(int(first)) != stretch(int(old.first[b])):  # none of them is before it
                 out[k] = self.first_starts(Cut(cut.first[k : k + 1], cut.samples), r)[0]
             else:
-                at = old.first[b : b + 1], after, m.sub, m.h
-                out[k] = self.kernel.blocks(r, *at, *u, before.starts[b : b + 1], False, m.coarse)[2][0]
+                begun = before.starts[b : b + 1]
+                out[k] = self.kernel.blocks(r, old.first[b : b + 1], after, drive, begun, False)[2][0]
         return out
 
 

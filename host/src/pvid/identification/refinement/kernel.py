@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.codegen.refine import RefinedParameter, signs_of, width_of, without_optional
 from pvid.identification.refinement.kernel_text import printed
@@ -18,6 +19,11 @@ from pvid.sim.compiled_plant import loaded
 
 Float = npt.NDArray[np.float64]
 
+_STEP = 0.1  # of a step times the fastest eigenvalue: the error of RK4 is below 1e-7 of a period
+_MOST_SUB = 16
+_SIGN_SUB = (16, 64)  # steps a sample where there are signs, whose width follows from these: a wide one biases
+_STEPS = 1e6  # of the run: inputs at each are kept
+_SHARPEST, _WIDEST = 1e-9, 1e6  # widths of signs
 _MOVED = 0.1  # of the logarithm of a sign's width: its derivative is a difference
 
 
@@ -25,6 +31,24 @@ def play_of(model: CompiledModel, sensor: str) -> str:
     """Name of the play of a sensor: play, and where several are fitted the sensor's behind it."""
     several = sum(one.kind == "sensor" and not one.driven for one in model.signals) > 1
     return f"play_{sensor}" if several else "play"
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """What moves a run.
+
+    Attributes
+    ----------
+    sub : steps a sample, of h [s]
+    u, du : inputs and their rates at begin, middle and end of each step [steps, 3, inputs]
+    coarse : steps, an even number or 1, that are taken as one where no friction reverses
+    """
+
+    sub: int
+    h: float
+    u: Float
+    du: Float
+    coarse: int = 1
 
 
 class RefinedKernel:
@@ -47,10 +71,56 @@ class RefinedKernel:
         self.states = self.made.order * len(self.made.coordinates)
         self.columns = self.states + len(self.made.parameters)
 
-    @property
-    def at_zero(self) -> tuple[Float, Float]:
-        """A state and inputs of 0."""
-        return np.zeros(self.states), np.zeros(len(self.made.inputs))
+    def start(self, p: Float) -> Float:
+        """r, with settings, from p of the weak form."""
+        known = {one.name: one.value for one in self.made.model.knowns}
+        r = [p[one.place] if one.place >= 0 else 0.0 for one in self.made.parameters]
+        return np.array(r + [known.get(name, 1.0) for name in self.made.settings])
+
+    def slopes_at_rest(self, r: Float) -> Float:
+        """dx'/dx [states, states] at a state and inputs of 0."""
+        return self.slopes(r, np.zeros(self.states), np.zeros(len(self.made.inputs)))
+
+    def without_signs(self, r: Float) -> Float:
+        """r with signs so wide that they do nothing."""
+        out = r.copy()
+        out[self.widths] = _WIDEST
+        return out
+
+    def steps(
+        self,
+        samples: int,
+        rate: float,
+        r: Float,
+        widths: Mapping[str, float] | None = None,
+        coarse: int | None = None,
+    ) -> tuple[int, int, Float]:
+        """Steps a sample, those of them that are one where no friction reverses, and r with widths of the signs.
+
+        Parameters
+        ----------
+        widths
+            by argument; by default the jump of the rate within a step that a friction's reversal makes: RK4 stays
+            stable and smooth
+        coarse : where there are signs; from the number of samples by default
+        """
+        if samples < 1:
+            raise PvidError("the recording is too short for the refinement")
+        r = self.without_signs(r)
+        smooth = min(max(1, int(np.ceil(self._fastest(r) / rate / _STEP))), _MOST_SUB)
+        fine = int(np.clip(_STEPS / samples, *_SIGN_SUB))
+        coarse = (coarse or max(2, fine // smooth // 2 * 2)) if self.widths else 1
+        sub = smooth * coarse
+        for place in self.widths:
+            sharp = r.copy()
+            sharp[place] = _SHARPEST
+            own = max(self._fastest(sharp) * _SHARPEST / rate / sub, _SHARPEST)
+            r[place] = (widths or {}).get(self.made.parameters[place].sign) or own
+        return sub, coarse, r
+
+    def _fastest(self, r: Float) -> float:
+        """Largest eigenvalue at rest [1/s]."""
+        return float(np.abs(np.linalg.eigvals(self.slopes_at_rest(r))).max())
 
     def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
         """Of the recording that holds each block, 0 where there is one."""
@@ -61,13 +131,9 @@ class RefinedKernel:
         r: Float,
         first: npt.NDArray[np.int32],
         samples: int,
-        sub: int,
-        h: float,
-        u: Float,
-        du: Float,
+        drive: Drive,
         starts: Float,
         derivatives: bool | Literal["starts"] = True,
-        coarse: int = 1,
     ) -> tuple[Float, Float | None, Float]:
         """Readings, derivatives, ends.
 
@@ -76,11 +142,8 @@ class RefinedKernel:
         r : parameters and settings
         first : sample of each block's start [blocks]
         samples : of each block
-        sub : steps a sample, of h [s]
-        u, du : inputs and their rates at begin, middle and end of each step [steps, 3, inputs]
         starts : [blocks, states]
         derivatives : "starts": those by the starts alone; other columns mean nothing
-        coarse : steps, an even number or 1, that are taken as one where no friction reverses
 
         Returns
         -------
@@ -96,11 +159,11 @@ class RefinedKernel:
             n,
             np.ascontiguousarray(first, np.int32).ctypes.data_as(ctypes.c_void_p),
             samples,
-            sub,
-            coarse,
-            ctypes.c_double(h),
-            _pointer(u),
-            _pointer(du),
+            drive.sub,
+            drive.coarse,
+            ctypes.c_double(drive.h),
+            _pointer(drive.u),
+            _pointer(drive.du),
             _pointer(starts),
             _pointer(z),
             None if jacobian is None else _pointer(jacobian),
@@ -116,8 +179,7 @@ class RefinedKernel:
         if jacobian is not None and self.widths:
             near = np.tile(r, (len(self.widths), 1))
             near[range(len(near)), self.widths] *= np.exp(_MOVED)
-            given = first, samples, sub, h, u, du, starts, False, coarse
-            moved = [self.blocks(one, *given)[0] for one in near]
+            moved = [self.blocks(one, first, samples, drive, starts, False)[0] for one in near]
             jacobian = np.concatenate([jacobian, (np.stack(moved, -1) - z[..., None]) / _MOVED], -1)
         return z, jacobian, ends
 
@@ -180,18 +242,12 @@ class PlayedKernel(RefinedKernel):
         r: Float,
         first: npt.NDArray[np.int32],
         samples: int,
-        sub: int,
-        h: float,
-        u: Float,
-        du: Float,
+        drive: Drive,
         starts: Float,
         derivatives: bool | Literal["starts"] = True,
-        coarse: int = 1,
     ) -> tuple[Float, Float | None, Float]:
         """As of RefinedKernel; ends are those of the motion."""
-        z, inner, ends = self._inner.blocks(
-            self._without(r), first, samples, sub, h, u, du, starts, derivatives, coarse
-        )
+        z, inner, ends = self._inner.blocks(self._without(r), first, samples, drive, starts, derivatives)
         jacobian = None if inner is None else np.concatenate([inner, np.zeros((*z.shape, 1))], -1)
         self._library.refine_play(
             len(first),
@@ -261,13 +317,9 @@ class TogetherKernel(RefinedKernel):
         r: Float,
         first: npt.NDArray[np.int32],
         samples: int,
-        sub: int,
-        h: float,
-        u: Float,
-        du: Float,
+        drive: Drive,
         starts: Float,
         derivatives: bool | Literal["starts"] = True,
-        coarse: int = 1,
     ) -> tuple[Float, Float | None, Float]:
         """As of RefinedKernel."""
         z = np.empty((len(first), samples, len(self.made.outputs)))
@@ -278,7 +330,7 @@ class TogetherKernel(RefinedKernel):
             own = np.flatnonzero(number == k)
             begun = np.ascontiguousarray(starts[own])
             z[own], inner, ends[own] = self._inner.blocks(
-                self._of(r, k), first[own], samples, sub, h, u, du, begun, derivatives, coarse
+                self._of(r, k), first[own], samples, drive, begun, derivatives
             )
             if jacobian is not None and inner is not None:
                 columns = [*range(self.states), *(self.states + place for place in self._places[k])]

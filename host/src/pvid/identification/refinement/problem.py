@@ -25,17 +25,13 @@ from pvid.identification.refinement.fit import (
     without_outliers,
 )
 from pvid.identification.refinement.inputs import inputs_of
-from pvid.identification.refinement.kernel import RefinedKernel, kernel_of
+from pvid.identification.refinement.kernel import kernel_of
 from pvid.model.compiled import CompiledModel
 from pvid.rig.gaps import stretches
 from pvid.rig.run import NUMBER
 
 Float = npt.NDArray[np.float64]
 
-_STEP = 0.1  # of a step times the fastest eigenvalue: the error of RK4 is below 1e-7 of a period
-_MOST_SUB = 16
-_SIGN_SUB = (16, 64)  # steps a sample where there are signs, whose width follows from these: a wide one biases
-_STEPS = 1e6  # of the run: inputs at each are kept
 _WIDER = (8.0, 64.0, 512.0, 4096.0)  # times the sharp width
 _WIDENING_PASSES = 10
 _WORSE = 3.0  # times the least sum of squares: signs that are wider still explain less
@@ -119,15 +115,6 @@ class RefinedMechanism:
         return apart
 
 
-def start_of(kernel: RefinedKernel, p: Float) -> Float:
-    """r, with settings, from p of the weak form."""
-    made = kernel.made
-    model = made.model
-    known = {one.name: one.value for one in model.knowns}
-    r = [p[one.place] if one.place >= 0 else 0.0 for one in made.parameters]
-    return np.array(r + [known.get(name, 1.0) for name in made.settings])
-
-
 def begins_of(signals: Mapping[str, Float], mean: int = 1) -> list[int]:
     """First sample of each of several recordings, of averages over so many samples; [0] of one."""
     number = signals.get(NUMBER, np.zeros(1))
@@ -135,12 +122,12 @@ def begins_of(signals: Mapping[str, Float], mean: int = 1) -> list[int]:
 
 
 def problem_of(
-    model: CompiledModel, signals: Mapping[str, Float], rate: float, r: Float, widths: Mapping[str, float] | None = None
+    model: CompiledModel, signals: Mapping[str, Float], rate: float, p: Float, widths: Mapping[str, float] | None = None
 ) -> tuple[Problem, Float]:
-    """The problem, and r with widths of the signs."""
+    """The problem, and r at p of the weak form, with widths of the signs."""
     kernel = kernel_of(model, begins=begins_of(signals))
     made = kernel.made
-    sub, coarse, r = steps_of(kernel, len(signals[made.outputs[0]]), rate, r, widths)
+    sub, coarse, r = kernel.steps(len(signals[made.outputs[0]]), rate, kernel.start(p), widths)
     inputs = inputs_of(model, made, signals, rate, sub)
     measured = Measured(
         np.stack([signals[name] for name in made.outputs], -1),
@@ -152,35 +139,6 @@ def problem_of(
         stretches=known_stretches(inputs[0], sub),
     )
     return Problem(kernel, measured), r
-
-
-def steps_of(
-    kernel: RefinedKernel,
-    samples: int,
-    rate: float,
-    r: Float,
-    widths: Mapping[str, float] | None = None,
-    coarse: int | None = None,
-) -> tuple[int, int, Float]:
-    """Steps a sample, those of them that are one where no friction reverses, and r with widths of the signs.
-
-    Parameters
-    ----------
-    widths : by argument; from the steps by default
-    coarse : where there are signs; from the number of samples by default
-    """
-    if samples < 1:
-        raise PvidError("the recording is too short for the refinement")
-    r = r.copy()
-    r[kernel.widths] = 1e6  # out of the way
-    fastest = float(np.abs(np.linalg.eigvals(kernel.slopes(r, *kernel.at_zero))).max())
-    smooth = min(max(1, int(np.ceil(fastest / rate / _STEP))), _MOST_SUB)
-    fine = int(np.clip(_STEPS / samples, *_SIGN_SUB))
-    coarse = (coarse or max(2, fine // smooth // 2 * 2)) if kernel.widths else 1
-    sub = smooth * coarse
-    for place in kernel.widths:
-        r[place] = (widths or {}).get(kernel.made.parameters[place].sign) or _width(kernel, r, place, sub, rate)
-    return sub, coarse, r
 
 
 def known_stretches(u: Float, sub: int) -> list[Stretch]:
@@ -199,14 +157,6 @@ def known_stretches(u: Float, sub: int) -> list[Stretch]:
     return [(int(first), int(end)) for first, end in zip(*stretches(there), strict=True)]
 
 
-def _width(kernel: RefinedKernel, r: Float, place: int, sub: int, rate: float) -> float:
-    """The jump of the rate within a step that a friction's reversal makes: RK4 stays stable and smooth."""
-    sharp = r.copy()
-    sharp[place] = 1e-9
-    steepest = float(np.abs(np.linalg.eigvals(kernel.slopes(sharp, *kernel.at_zero))).max()) * 1e-9
-    return max(steepest / rate / sub, 1e-9)
-
-
 def refine_mechanism(
     model: CompiledModel,
     signals: Mapping[str, Float],
@@ -222,7 +172,7 @@ def refine_mechanism(
     block_s : length of a block [s]
     widths : of signs, by argument; from the sampling by default
     """
-    problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
+    problem, r = problem_of(model, signals, rate, p, widths)
     prior = prior_about(problem, r)
     samples = max(8, round(block_s * rate))
     shorter = refined(problem, prior, (max(8, samples // 3),))
@@ -254,7 +204,7 @@ def simulated_at(answer: Analysis, p: Float) -> RefinedMechanism:
     """
     model, recording = answer.model, answer.recording
     rate = recording.sample_rate
-    problem, r = problem_of(model, recording.run, rate, start_of(kernel_of(model), p))
+    problem, r = problem_of(model, recording.run, rate, p)
     cut = problem.cut(max(8, round(2 * answer.found.design.window_s * rate)))
     return RefinedMechanism(problem, problem.with_starts(prior_about(problem, r), cut))
 

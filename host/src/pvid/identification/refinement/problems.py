@@ -12,7 +12,7 @@ from pvid.codegen.refine import LOG_SD, SKEW, WIDTH_SD, RefinedParameter, is_dri
 from pvid.identification.refinement.fit import Budget, Inputs, Measured, Prior, Problem, Refined
 from pvid.identification.refinement.inputs import LateInputs, inputs_of, is_late, without_jumps
 from pvid.identification.refinement.kernel import PlayedKernel, kernel_of, play_of
-from pvid.identification.refinement.problem import begins_of, known_stretches, start_of, steps_of
+from pvid.identification.refinement.problem import begins_of, known_stretches
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 
@@ -58,7 +58,7 @@ class Problems:
         self._model, self._window_s, self._rate = model, window_s, rate
         self._base = kernel_of(model)
         made = self._base.made
-        likely = [p for p in starts if self._base.possible(start_of(self._base, p))]
+        likely = [p for p in starts if self._base.possible(self._base.start(p))]
         if not likely:
             raise PvidError(f"no mechanism can have the guesses of {model.name}")
         self._p = likely[0]
@@ -134,8 +134,7 @@ class Problems:
         made, rate = kernel.made, self._rate / mean
         samples = len(self._signals[made.outputs[0]]) // mean
         coarse = _SIGN_COARSE if optional and not self._base.widths else None
-        r = start_of(kernel, self._p)
-        sub, coarse, _ = steps_of(kernel, samples, rate, r, None, coarse)
+        sub, coarse, _ = kernel.steps(samples, rate, kernel.start(self._p), None, coarse)
         z, grown = averages(np.stack([self._signals[name] for name in made.outputs], -1)[: samples * mean], mean)
         inputs: Inputs
         if is_driven_by_derivatives(model):
@@ -165,8 +164,8 @@ class Problems:
         kernel = problem.kernel
         names = [one.name for one in kernel.made.parameters]
         p = np.array([values[name] for name in self._model.p_names])
-        r = start_of(kernel, p)
-        _, _, sharp = steps_of(kernel, len(problem.measured.z), problem.measured.rate, r, None, problem.measured.coarse)
+        r, measured = kernel.start(p), problem.measured
+        _, _, sharp = kernel.steps(len(measured.z), measured.rate, r, None, measured.coarse)
         r[kernel.widths] = sharp[kernel.widths]
         for k, name in enumerate(names):
             r[k] = values.get(name, r[k])
@@ -209,7 +208,7 @@ class Problems:
         r = self.r(problem, self.values_of_p(self._p))
 
         def damping(r: Float) -> float:
-            return -float(np.trace(kernel.slopes(r, *kernel.at_zero)))
+            return -float(np.trace(kernel.slopes_at_rest(r)))
 
         out = []
         for k, one in enumerate(kernel.made.parameters):
@@ -235,9 +234,7 @@ class Problems:
     def _modes_hz(self, p: Float) -> tuple[float, float]:
         """Frequencies of the slowest oscillation and of the fastest motion about rest [Hz]; inf where it is none."""
         kernel = self._base
-        r = start_of(kernel, p)
-        r[kernel.widths] = 1e6  # out of the way
-        slopes = kernel.slopes(r, *kernel.at_zero)
+        slopes = kernel.slopes_at_rest(kernel.without_signs(kernel.start(p)))
         if not np.isfinite(slopes).all():
             return 1 / self._window_s, np.inf
         found = np.linalg.eigvals(slopes)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pvid.base.recent import Recent
 from pvid.model.signals import Jet
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.front import segments_of, weights_of
+from pvid.oracle.weak.front import segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import Compiled, record_of
 from pvid.oracle.weak.scores import Scores
@@ -67,7 +67,7 @@ class _Spectrum:
 
     def response(self, design: WeakDesign, order: int) -> tuple[Float, npt.NDArray[np.complex128]]:
         """These frequencies [rad/s], and what the filter of a derivative makes of them; of each filter once."""
-        weights = weights_of(design, order)
+        weights = design.weights(order)
         key = design.sample_rate, weights.tobytes()
         if key not in self._responses:
             omega = 2 * np.pi * np.fft.rfftfreq(self._size, 1 / design.sample_rate)[self._used]

@@ -20,9 +20,9 @@ from pvid.model.compiled import CompiledModel, Part
 from pvid.model.evaluation import numpy_function
 from pvid.model.signals import TIME, Integral, Jet, jets, sgn
 from pvid.oracle.weak import reversals
-from pvid.oracle.weak.front import Grid, filtered, weights_of
+from pvid.oracle.weak.filters import polynomial_weights
+from pvid.oracle.weak.front import Grid, filtered
 from pvid.oracle.weak.functions import Float, TestFunctions
-from pvid.oracle.weak.polynomials import polynomial_weights
 
 _ONE = sp.Integer(1)
 
@@ -298,7 +298,7 @@ class Channels:
             return reversals.averaged(v)
         weights = self._sign_slopes[argument]
         straight = all(one.is_number for one in weights.values()) and all(jet.order == 1 for jet in weights)
-        gain = weights_of(design, 1)
+        gain = design.weights(1)
         per_sensor = float(np.sum(gain**2)) ** 0.5
         piece = max(2, round(_PIECE * 2 * design.hop / (2 * np.pi * design.highest)))
         if straight:
@@ -332,7 +332,7 @@ class Channels:
 
 def blur_of(position: Float, grid: Grid, v: Float) -> Float:
     """How far the smoothing of a velocity may be off [n]: its distance from that of twice the length, near by."""
-    taps = len(weights_of(grid.design, 1))
+    taps = len(grid.design.weights(1))
     degree = grid.design.rate_degree if grid.design.rate_taps > 1 else grid.design.degree
     if len(position) <= 4 * taps:
         return np.zeros(v.shape)

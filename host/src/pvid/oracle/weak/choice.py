@@ -16,18 +16,17 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.oracle.weak import verdict, work
+from pvid.oracle.weak import work
+from pvid.oracle.weak.assessment import ALMOST_0, Assessed
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import blur_of, rates_of_drives, shift_of
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.errors import uncertainty
-from pvid.oracle.weak.failures import FAILURES, attempted
+from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, WeakRows
 from pvid.oracle.weak.starts import starts_about
-from pvid.oracle.weak.zero import ALMOST_0, near_zero
 
 _FEWEST_WINDOWS = 18
 _SHORT_RUN = 10  # windows of a run that has no more: its halves are not compared
@@ -144,22 +143,21 @@ def _scored(
         if rows.windows < fewest:
             return None
         fit = gated(rows, start, equation_error=errors, passes=_PASSES, settled=_SETTLED)
-        found = uncertainty(fit)
+        own = Assessed.of(fit)
         other = other_line(fit)
         blurred = shift_of(fit, run, design)
     except FAILURES:
         return None
-    small, of_small = attempted(lambda: near_zero(fit, found.se)) or (np.zeros(len(fit.p), np.bool_), found.se)
+    small, of_small, found = own.small, own.se, own.found
     size = np.where(small, fit.parameters.guess, np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd))
     predicted = np.where(small, of_small, found.predicted)
     apart = np.zeros(len(fit.p)) if other is None else other - fit.p
     relative = np.hypot(np.hypot(np.hypot(predicted, apart), blurred) / size, blur_of(model, run, design))
     if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
         return None
-    known = attempted(lambda: verdict.is_known(model.bare, fit, small, of_small)) or False
     p = np.where(small, np.maximum(fit.p, ALMOST_0 * of_small), fit.p)
     score = float(np.exp(np.mean(np.log(relative))))
-    return Scored(design, score, p, found.chi2, relative * size, known, bool(small.any()), min(found.r2))
+    return Scored(design, score, p, found.chi2, relative * size, own.known, bool(small.any()), min(found.r2))
 
 
 def power_of(model: Compiled) -> int:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
+import numpy as np
+
 from pvid.base.errors import PvidError
-from pvid.oracle.weak.comb import nodes_of
-from pvid.oracle.weak.functions import TestFunctions
-from pvid.oracle.weak.polynomials import edge_of
+from pvid.oracle.weak.filters import at_samples, compensator, edge_of, nodes_of, polynomial_weights
+from pvid.oracle.weak.functions import Float, TestFunctions
 
 _BAND = 1.2  # highest frequency of the motion over that of the test functions
 
@@ -33,7 +34,7 @@ class WeakDesign:
     soft : width of the soft sign [unit of the velocity]
     joint : whiten all row kinds together; noise that they share then counts once
     comb
-        values and derivatives from block sums and compensators at the steps (pvid.oracle.weak.comb) in place of
+        values and derivatives from block sums and compensators at the steps (pvid.oracle.weak.filters) in place of
         polynomials at the samples, with about as many taps. Needs a decimation above 1
     """
 
@@ -80,24 +81,37 @@ class WeakDesign:
         """Highest harmonic."""
         return self.functions // 2 + self.power // 2
 
-    def band_of(self, order: int) -> float:
-        """Highest frequency that the compensator of a derivative is made for [Hz].
-
-        A little above the test functions', but not above where the polynomial of as many taps is right.
-        """
-        found = _BAND * self.highest / self.window_s
+    def weights(self, order: int) -> Float:
+        """Weights of the filter that gives the derivative of this order from raw samples [1 / s^order]."""
+        if self.comb:
+            return at_samples(self.decimation, tuple(self.step_weights(order)))
+        if order == 0:
+            return polynomial_weights(self.taps, self.degree, 0)
         taps, degree = self._polynomial_of(order)
-        return min(found, edge_of(taps, max(degree, order), order) * self.sample_rate) if taps > 1 else found
+        if taps == 1:
+            raise PvidError("a model that needs a derivative needs rate_taps or taps above 1")
+        return polynomial_weights(taps, max(degree, order), order) * self.sample_rate**order
 
-    def _polynomial_of(self, order: int) -> tuple[int, int]:
-        rates = order > 0 and self.rate_taps > 1
-        return (self.rate_taps, self.rate_degree) if rates else (self.taps, self.degree)
+    def step_weights(self, order: int) -> Float:
+        """Weights at the steps of the block sums; without a decimation those at the samples [1 / s^order].
 
-    def compensator_of(self, order: int) -> tuple[int, int]:
-        """Of a derivative: steps on either side, about as long as the polynomial; frequencies at which it is exact."""
+        A compensator is about as long as the polynomial. Its band reaches a little above the test functions', but not
+        above where the polynomial of as many taps is right.
+        """
+        if not self.comb:
+            return self.weights(order)
         taps, degree = self._polynomial_of(order)
         count = nodes_of(order, degree)
-        return max(round((taps + 1 - 2 * self.decimation) / (2 * self.decimation)), count), count
+        half = max(round((taps + 1 - 2 * self.decimation) / (2 * self.decimation)), count)
+        band = _BAND * self.highest / self.window_s
+        if taps > 1:
+            band = min(band, edge_of(taps, max(degree, order), order) * self.sample_rate)
+        return np.array(compensator(self.decimation, self.sample_rate, order, half, band, count))
+
+    def _polynomial_of(self, order: int) -> tuple[int, int]:
+        """Taps and degree."""
+        rates = order > 0 and self.rate_taps > 1
+        return (self.rate_taps, self.rate_degree) if rates else (self.taps, self.degree)
 
     @property
     def test_functions(self) -> TestFunctions:

@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from pvid.model.compiled import CompiledModel, Edge
 from pvid.model.corners import feedthroughs
-from pvid.oracle.weak.choice import lengths, made, power_of, score_of
-from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.choice import basis_of, lengths, made, score_of
 from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.identify import ready
 
@@ -38,7 +37,7 @@ def with_edges(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_ra
     if not sensors:
         return model
     longest = max((part.stop - part.start for part in segments_of(samples_of(model, dict(run)))), default=0)
-    basis = WeakDesign(sample_rate, 64 / sample_rate, 12, power_of(ready(model)), rate_taps=21, rate_degree=3)
+    basis = basis_of(ready(model), sample_rate)
     designs = [made(basis, window_s=one) for one in lengths(longest, sample_rate)[-_DESIGNS:]]
     chi2: dict[Edge, float] = {}
     for edge in EDGES:

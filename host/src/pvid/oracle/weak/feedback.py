@@ -18,7 +18,7 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Jet
-from pvid.oracle.weak.front import filtered, segments_of, weights_of
+from pvid.oracle.weak.front import filtered, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason
@@ -118,10 +118,10 @@ def _moves_nothing(model: CompiledModel, fit: Fit, given: Signal, outputs: list[
         order = _order_of(model, one.name)
         if order < 1:
             continue
-        z = filtered(np.nan_to_num(grid.raw[one.name]), weights_of(grid.design, 0))[grid.places]
+        z = filtered(np.nan_to_num(grid.raw[one.name]), grid.design.weights(0))[grid.places]
         law.append(z)
         if order > 1 and (grid.design.rate_taps > 1 or grid.design.taps > 1):
-            law.append(filtered(np.nan_to_num(grid.raw[one.name]), weights_of(grid.design, 1))[grid.places])
+            law.append(filtered(np.nan_to_num(grid.raw[one.name]), grid.design.weights(1))[grid.places])
         if one.unit == "rad":
             law += [np.sin(z), np.cos(z)]
     basis = np.stack([sums(x) for x in law], axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.corners import OfInput
 from pvid.model.signals import Jet
-from pvid.oracle.weak.comb import at_samples, compensator
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.polynomials import polynomial_weights
+from pvid.rig.run import NUMBER
 
 Float = npt.NDArray[np.float64]
 
@@ -64,24 +64,19 @@ class Grid:
         return np.array([part.stop // self.design.hop - 1 for part in self.parts[:-1]], np.int64)
 
 
-def weights_of(design: WeakDesign, order: int) -> Float:
-    """Weights of the filter that gives the derivative of this order from raw samples [1 / s^order]."""
-    if design.comb:
-        return at_samples(design.decimation, tuple(step_weights_of(design, order)))
-    if order == 0:
-        return polynomial_weights(design.taps, design.degree, 0)
-    taps, degree = (design.rate_taps, design.rate_degree) if design.rate_taps > 1 else (design.taps, design.degree)
-    if taps == 1:
-        raise PvidError("a model that needs a derivative needs rate_taps or taps above 1")
-    return polynomial_weights(taps, max(degree, order), order) * design.sample_rate**order
-
-
-def step_weights_of(design: WeakDesign, order: int) -> Float:
-    """Weights at the steps of the block sums; without a decimation those at the samples [1 / s^order]."""
-    if not design.comb:
-        return weights_of(design, order)
-    half, count = design.compensator_of(order)
-    return np.array(compensator(design.decimation, design.sample_rate, order, half, design.band_of(order), count))
+def with_jumps(
+    run: Mapping[str, npt.ArrayLike], made: Mapping[str, OfInput], sample_rate: float
+) -> dict[str, npt.ArrayLike]:
+    """A run with these signals of its inputs [n]; the first sample is also the one before it."""
+    out = dict(run)
+    for name, of in made.items():
+        if of.name not in run:
+            continue
+        u = np.asarray(run[of.name], np.float64)
+        before = np.concatenate([u[:1], u[:-1]])
+        before = np.where(np.isnan(before) & np.isfinite(u), u, before)
+        out[name] = {"jump": (u - before) / (12 * sample_rate), "before": before, "after": u}[of.kind]
+    return out
 
 
 def samples_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> dict[str, Float]:
@@ -115,7 +110,7 @@ def grid_of(
     samples = samples_of(model, run)
     size = next(iter(samples.values())).size
     orders = {jet.order for jet in needed} | {0}
-    margin = max(max(len(weights_of(design, order)) // 2 for order in orders), 2)
+    margin = max(max(len(design.weights(order)) // 2 for order in orders), 2)
     places = np.arange(margin, size - margin, design.decimation)
     if len(places) < 2 * design.hop:
         raise PvidError(
@@ -127,7 +122,7 @@ def grid_of(
     }
     known = _in_common(like, raw, design, orders) if like is not None and np.array_equal(places, like.places) else {}
     jets = {
-        jet: known[jet] if jet in known else filtered(raw[jet.of], weights_of(design, jet.order))[places]
+        jet: known[jet] if jet in known else filtered(raw[jet.of], design.weights(jet.order))[places]
         for jet in needed
         if jet.of in raw
     }
@@ -136,7 +131,7 @@ def grid_of(
 
 def _in_common(like: Grid, raw: Mapping[str, Float], design: WeakDesign, orders: set[int]) -> dict[Jet, Float]:
     """Jets of another grid with the same steps that these samples and this design have too."""
-    filters = {one for one in orders if np.array_equal(weights_of(design, one), weights_of(like.design, one))}
+    filters = {one for one in orders if np.array_equal(design.weights(one), like.design.weights(one))}
     names = {name for name, x in raw.items() if name in like.raw and np.array_equal(x, like.raw[name])}
     return {jet: x for jet, x in like.jets.items() if jet.of in names and jet.order in filters}
 
@@ -149,6 +144,17 @@ def segments_of(samples: Mapping[str, Float]) -> list[slice]:
     there = np.logical_and.reduce(finite)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
     return [slice(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def longest_of_each(segments: Sequence[slice], run: Mapping[str, npt.ArrayLike]) -> list[slice]:
+    """The longest segment of each recording of a run (pvid.rig.run.NUMBER); of the run where it is one recording."""
+    longest: dict[float, slice] = {}
+    for one in segments:
+        number = float(np.asarray(run[NUMBER])[one.start]) if NUMBER in run else 0.0
+        before = longest.setdefault(number, one)
+        if one.stop - one.start > before.stop - before.start:
+            longest[number] = one
+    return list(longest.values())
 
 
 def largest(x: Float) -> float:

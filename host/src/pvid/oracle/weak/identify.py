@@ -11,15 +11,15 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
-from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Known
 from pvid.oracle.weak import verdict, work
+from pvid.oracle.weak.assessment import Assessed, assessed, estimated_near_zero
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import shift_of
 from pvid.oracle.weak.choice import Scored, basis_of, ranked
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.errors import Uncertainty, uncertainty
-from pvid.oracle.weak.failures import FAILURES, Found, attempted
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
@@ -30,9 +30,9 @@ from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows, record_of
 from pvid.oracle.weak.samples import explains, of_samples
 from pvid.oracle.weak.scale import of_scale
 from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
-from pvid.oracle.weak.verdict import Halves, Judged, Reason, Verdict
+from pvid.oracle.weak.verdict import Attempts, Halves, Judged, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
-from pvid.oracle.weak.zero import estimated_near_zero, near_zero, on_their_own_scale
+from pvid.oracle.weak.zero import on_their_own_scale
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,15 @@ class Identified:
     p : [n_p]
     se : published standard errors, those of gains included [n_p]
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
-    by_known : of each constant with a standard deviation, what p is off by over the constant's error [n_p]
     by_clock : what p is off by over the relative error of the sample rate, 0 where the model has none [n_p]
     by_neglect : what p may be off by because equations are linearised [n_p]
+    gains
+        what p is off by for one standard deviation of each constant, gain and clock that has any, in this order, and
+        by_neglect [gains, n_p]
     by_model : what p may be off by because the equations lack something, or a signal is not what was recorded [n_p]
     lacking : what the equations seem to lack; None: the numbers of the test ran away
     named : the terms that explain it; None: nothing is lacking that moves a parameter visibly
-    shifts : what p may be off by that way, and how far other estimates are [terms, n_p]; None: those of `lacking`
+    shifts : what p may be off by that way, and how far other estimates are [terms, n_p]
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     covariance : of p, that of `predicted` [n_p, n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
@@ -65,6 +67,7 @@ class Identified:
     halves : p of either half; None: too short
     fit : rows and residuals, for plots
     ranking : designs that were tried, the best first; () where the design was given
+    allowance : units of work that the search for a design may do
     """
 
     names: tuple[str, ...]
@@ -85,19 +88,26 @@ class Identified:
     halves: Halves | None
     fit: Fit
     ranking: tuple[Scored, ...]
+    allowance: float
     by_gain: dict[str, Float]
-    by_known: dict[str, Float]
     by_clock: Float
     by_neglect: Float
+    gains: Float
     by_model: Float
     lacking: Missing | None
     named: Explained | None
-    shifts: Float | None = None
+    shifts: Float
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
         """name -> (value, standard error)."""
         return {name: (float(p), float(se)) for name, p, se in zip(self.names, self.p, self.se, strict=True)}
+
+    @property
+    def noise(self) -> Float:
+        """The published standard errors but for gains, constants and what is missing [n_p]."""
+        other = np.sum(self.gains**2, axis=0) + self.by_model**2
+        return np.asarray(np.sqrt(np.maximum(self.se**2 - other, 0.0)))
 
     @cached_property
     @np.errstate(all="ignore")
@@ -169,14 +179,16 @@ def identify(
     model = ready(compiled)
     begun = start_of(compiled, start)
     with_error = weights == "residuals"
+    units = allowance_of(compiled, run, sample_rate)
     if design is None:
-        units = allowance_of(compiled, run, sample_rate)
         with work.limited(units):
             ranking = tuple(ranked(model, run, sample_rate, begun, with_error))
         share = _OF_HOPELESS if ranking[0].is_hopeless else _OF_KNOWN if ranking[0].known else _OF_UNKNOWN
         with work.limited(share * units):
-            return _judged(compiled, run, ranking[0].design, begun, ranking[0].p, compensate, with_error, ranking)
-    return _judged(compiled, run, design, begun, None, compensate, with_error)
+            return _judged(
+                compiled, run, ranking[0].design, begun, ranking[0].p, compensate, with_error, units, ranking
+            )
+    return _judged(compiled, run, design, begun, None, compensate, with_error, units)
 
 
 def _judged(
@@ -187,6 +199,7 @@ def _judged(
     near: Float | None,
     compensate: bool,
     with_error: bool,
+    units: float,
     ranking: tuple[Scored, ...] = (),
 ) -> Identified:
     """The estimate by a design, with all its checks.
@@ -197,18 +210,19 @@ def _judged(
     """
     model, sample_rate = ready(compiled), used.sample_rate
     rows = WeakRows.of(model, run, used)
-    fit = _estimated(rows, begun, with_error, compensate)
-    if near is not None and not _found(compiled, fit):  # the guesses lead elsewhere
-        other = replace(_estimated(rows, near, with_error, compensate), start=fit.start)
-        fit = fit if other.diverged and not fit.diverged else other
+    own = assessed(_estimated(rows, begun, with_error, compensate))
+    first = own.fit
+    if near is not None and not own.is_found:  # the guesses lead elsewhere
+        other = replace(_estimated(rows, near, with_error, compensate), start=first.start)
+        own = own if other.diverged and not first.diverged else assessed(other)
     weighted_anew = with_error
-    if with_error and not fit.settled and not _found(compiled, fit):
-        alone = replace(_estimated(rows, near, False, compensate), start=fit.start)
-        if _found(compiled, alone):
-            fit, weighted_anew = alone, False
-    fit = estimated_near_zero(fit, weighted_anew, compensate)
-    found = attempted(lambda: uncertainty(fit)) or Uncertainty.unbounded(fit)
-    attempt = _Attempts()
+    if with_error and not own.fit.settled:
+        alone = assessed(replace(_estimated(rows, near, False, compensate), start=first.start))
+        if alone.is_found:
+            own, weighted_anew = alone, False
+    own = estimated_near_zero(own, weighted_anew, compensate)
+    fit, found = own.fit, own.found
+    attempt = Attempts()
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
     white = attempt("a white force as the error of the equations", lambda: as_white_force(fit))
     library = Library(run, used, fit)
@@ -219,14 +233,13 @@ def _judged(
         if one.gain_sd > 0 or one.unit != "rad"
     }
     by_clock = _or_nan(fit, library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
-    by_known = {
-        one.name: _or_nan(fit, partial(of_known, compiled, run, fit, one)) for one in compiled.knowns if one.sd > 0
-    }
     by_neglect = model.parameters.positive * fit.p * neglected(compiled, run)
+    gains = [one.sd * _or_nan(fit, partial(of_known, compiled, run, fit, one)) for one in compiled.knowns if one.sd > 0]
+    gains += [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
+    gains += [*([compiled.clock_sd * by_clock] if compiled.clock_sd else []), by_neglect]
     parts = [
         verdict.widened(found.se, halves),
-        *given(compiled, by_gain, by_known, by_clock),
-        by_neglect,
+        *gains,
         *([] if blurred is None else [blurred]),
         *([] if white is None else [white - fit.p]),
     ]
@@ -236,7 +249,7 @@ def _judged(
     named: Explained | None = None
     lacking = None if fit.diverged else attempt("what is missing", lambda: Missing.of(library, se))
     if not fit.diverged:
-        reasons += attempt.reasons(_checks(rows, run, fit, found, halves, judged, with_error))
+        reasons += attempt.reasons(_checks(rows, run, own, halves, judged, with_error))
         if (
             lacking is not None
             and (lacking.visible.any() or lacking.is_large)
@@ -248,8 +261,8 @@ def _judged(
             if named is not None and any(one.name == "halves" for one in reasons):
                 named = replace(named, complete=named.complete and _halves_agree(compiled, named.fit))
             if named is not None:
-                for other in (named.fit, named.further) if named.complete else ():
-                    lacking = lacking.also(other.p - fit.p)
+                for one in (named.fit, named.further) if named.complete else ():
+                    lacking = lacking.also(one.p - fit.p)
                 reasons += of_missing(fit, lacking, named, min(found.r2))
         if lacking is not None and (unknown := of_unexplained(compiled, found, lacking)):
             lacking = lacking.also(library.scores.by_parts())
@@ -280,13 +293,15 @@ def _judged(
         halves=halves,
         fit=fit,
         ranking=ranking,
+        allowance=units,
         by_gain=by_gain,
-        by_known=by_known,
         by_clock=by_clock,
         by_neglect=by_neglect,
+        gains=np.array(gains),
         by_model=by_model,
         lacking=lacking,
         named=named,
+        shifts=np.zeros((0, len(se))) if lacking is None else lacking.shifts,
     )
 
 
@@ -309,42 +324,16 @@ def _estimated(rows: WeakRows, start: Float | None, equation_error: bool, compen
         ) from error
 
 
-class _Attempts:
-    """Computations beside the fit. Those whose numbers run away are named in one warning: they may have had one."""
-
-    def __init__(self) -> None:
-        self._without: list[str] = []
-
-    def __call__(self, what: str, computation: Callable[[], Found]) -> Found | None:
-        try:
-            return computation()
-        except FAILURES:
-            self._without.append(what)
-            return None
-
-    def reasons(self, checks: Mapping[str, Callable[[], list[Reason]]]) -> list[Reason]:
-        """Of all checks, by what they look at."""
-        return [one for what, check in checks.items() for one in self(what, check) or []]
-
-    @property
-    def failed(self) -> list[Reason]:
-        """The warning."""
-        if not self._without:
-            return []
-        what = listed(dict.fromkeys(self._without))
-        return [Reason("unchecked", f"Not checked, because the numbers ran away: {what}.")]
-
-
 def _checks(
     rows: WeakRows,
     run: Mapping[str, npt.ArrayLike],
-    fit: Fit,
-    found: Uncertainty,
+    own: Assessed,
     halves: Halves | None,
     judged: Sequence[Judged],
     equation_error: bool,
 ) -> dict[str, Callable[[], list[Reason]]]:
     """Every check of an estimate, by what it looks at."""
+    fit, found = own.fit, own.found
     model, design = fit.rows.compiled, rows.record.grid.design
     bare = model.bare
 
@@ -357,7 +346,7 @@ def _checks(
         "the samples": lambda: of_samples(bare, run, design.sample_rate, fit),
         "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
         "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
-        "feedback": lambda: of_feedback(bare, run, fit, _determined(bare, fit, found)),
+        "feedback": lambda: of_feedback(bare, run, fit, own.known),
         "the residuals": lambda: verdict.of_residuals(found),
         "the range": lambda: verdict.of_range(bare, fit.p, judged),
         "spoiled windows": lambda: verdict.of_spoiled(rows, fit),
@@ -381,26 +370,6 @@ def _or_nan(fit: Fit, computation: Callable[[], Float]) -> Float:
     """What is computed [n_p]; NaN where its numbers ran away."""
     found = attempted(computation)
     return np.full(len(fit.p), np.nan) if found is None else found
-
-
-def _found(model: CompiledModel, fit: Fit) -> bool:
-    """Whether a search came to rest at plausible parameters."""
-    found = attempted(lambda: uncertainty(fit)) if fit.settled else None
-    return found is not None and _determined(model, fit, found)
-
-
-def _determined(model: CompiledModel, fit: Fit, found: Uncertainty) -> bool:
-    """Whether every parameter has a value, within its range, or may be 0."""
-    return bool(attempted(lambda: verdict.is_known(model, fit, *near_zero(fit, found.se))))
-
-
-def given(
-    model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float], by_clock: Float
-) -> list[Float]:
-    """Errors of p [n_p] for one standard deviation of each constant, gain and clock that has any, in this order."""
-    errors = [one.sd * by_known[one.name] for one in model.knowns if one.sd > 0]
-    errors += [one.gain_sd * by_gain[one.name] for one in model.signals if one.gain_sd > 0]
-    return errors + ([model.clock_sd * by_clock] if model.clock_sd else [])
 
 
 def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:

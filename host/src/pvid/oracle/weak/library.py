@@ -12,9 +12,9 @@ import numpy.typing as npt
 from pvid.model.compiled import CompiledModel
 from pvid.model.evaluation import numpy_function
 from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.filters import polynomial_weights
 from pvid.oracle.weak.front import filtered, largest
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.polynomials import polynomial_weights
 from pvid.oracle.weak.rows import record_of
 from pvid.oracle.weak.scores import Scores, between
 from pvid.oracle.weak.solve import Fit

@@ -16,9 +16,8 @@ from pvid.model.corners import with_corners
 from pvid.model.signals import Integral, Jet
 from pvid.model.together import in_columns
 from pvid.oracle.weak.channels import Channels, Record
-from pvid.oracle.weak.corners import with_jumps
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.front import grid_of, samples_of, segments_of
+from pvid.oracle.weak.front import grid_of, longest_of_each, samples_of, segments_of, with_jumps
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.noise import NoiseFilters, NoiseModel, ReversalNoise
 from pvid.oracle.weak.parameters import Parameters
@@ -139,7 +138,7 @@ def record_of(
     samples = samples_of(compiled.model, whole)
     segments = segments_of(samples)
     if any(one.has(Integral) for one in compiled.channels.opaque.values()):
-        segments = _longest_of_each(segments, run)
+        segments = longest_of_each(segments, run)
     size = len(next(iter(samples.values())))
     last = compiled.channels.last
     if times is not None or (last is not None and last.grid.raw_size != size) or len(segments) > 1:
@@ -159,17 +158,6 @@ def record_of(
     if not records:
         raise refused
     return Record.joined(records, firsts, size)
-
-
-def _longest_of_each(segments: Sequence[slice], run: Mapping[str, npt.ArrayLike]) -> list[slice]:
-    """The longest segment of each recording of a run (pvid.rig.run.NUMBER); of the run where it is one recording."""
-    longest: dict[float, slice] = {}
-    for one in segments:
-        number = float(np.asarray(run[NUMBER])[one.start]) if NUMBER in run else 0.0
-        before = longest.setdefault(number, one)
-        if one.stop - one.start > before.stop - before.start:
-            longest[number] = one
-    return list(longest.values())
 
 
 class WeakRows:

@@ -18,6 +18,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.terms import Act, Candidate
 from pvid.oracle.weak.verdict import Reason
+from pvid.rig.gaps import at_its_ends
 from pvid.sim.motion import motion_of
 
 _CLIPPED = 2e-3  # of the samples at the limit, from which a sensor clips
@@ -77,9 +78,7 @@ def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) 
     inertial = any(order_of(one, [signal.name]) > 1 for one in model.equations)
     others = [y for name, y in samples.items() if name != signal.name]
     step = max(signal.resolution, 1e-6 * reach)
-    for limit, side in ((float(np.nanmax(x)), "largest"), (float(np.nanmin(x)), "smallest")):
-        at = np.concatenate([[False], x == limit, [False]])
-        firsts, ends = np.flatnonzero(~at[:-1] & at[1:]), np.flatnonzero(at[:-1] & ~at[1:])
+    for limit, side, firsts, ends in at_its_ends(x):
         count = 0
         for first, end in zip(firsts, ends, strict=True):
             if end - first < _HELD or first < _APPROACH:

@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 
 from pvid.model.compiled import Signal
+from pvid.oracle.weak.filters import polynomial_weights
 from pvid.oracle.weak.front import filtered, in_segments
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.polynomials import polynomial_weights
 from pvid.sim.imperfections import with_play
 
 _SMOOTHED = (21, 2)  # samples and degree, for the direction of a motion that has a play

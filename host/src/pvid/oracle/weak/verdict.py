@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,7 +13,7 @@ from pvid.base.rounding import percent
 from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel, Unknown
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
-from pvid.oracle.weak.failures import attempted
+from pvid.oracle.weak.failures import FAILURES, Found, attempted
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import UNKNOWN, Parameters
 from pvid.oracle.weak.rows import WeakRows
@@ -477,3 +477,29 @@ def widened(se: Float, halves: Halves | None) -> Float:
 def sorted_by_gravity(reasons: Iterable[Reason]) -> tuple[Reason, ...]:
     """Alarms first."""
     return tuple(sorted(reasons, key=lambda one: not one.alarm))
+
+
+class Attempts:
+    """Computations beside the fit. Those whose numbers run away are named in one warning: they may have had one."""
+
+    def __init__(self) -> None:
+        self._without: list[str] = []
+
+    def __call__(self, what: str, computation: Callable[[], Found]) -> Found | None:
+        try:
+            return computation()
+        except FAILURES:
+            self._without.append(what)
+            return None
+
+    def reasons(self, checks: Mapping[str, Callable[[], list[Reason]]]) -> list[Reason]:
+        """Of all checks, by what they look at."""
+        return [one for what, check in checks.items() for one in self(what, check) or []]
+
+    @property
+    def failed(self) -> list[Reason]:
+        """The warning."""
+        if not self._without:
+            return []
+        what = listed(dict.fromkeys(self._without))
+        return [Reason("unchecked", f"Not checked, because the numbers ran away: {what}.")]

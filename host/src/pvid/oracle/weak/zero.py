@@ -14,10 +14,8 @@ from statistics import NormalDist
 import numpy as np
 import numpy.typing as npt
 
-from pvid.oracle.weak.errors import covariance_of, moments_of, uncertainty
-from pvid.oracle.weak.failures import attempted
+from pvid.oracle.weak.errors import covariance_of, moments_of
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.rows import Compiled, WeakRows
 from pvid.oracle.weak.solve import Fit
@@ -27,7 +25,6 @@ Bool = npt.NDArray[np.bool_]
 # Its own scale is that of its guess: a standard error beyond this part of the guess determines nothing.
 _OF_GUESS = 0.5
 
-ALMOST_0 = 0.01  # standard errors: what replaces 0 and less, as a core and an output of the model may divide by it
 _CERTAINTY = 0.95
 
 
@@ -53,37 +50,12 @@ def near_zero(fit: Fit, se: Float) -> tuple[Bool, Float]:
     none = np.zeros(len(fit.p), np.bool_)
     if not doubtful.any():
         return none, se
-    own = _on_own_scale(fit, doubtful)
+    own = on_own_scale(fit, doubtful)
     information, neighbours = moments_of(own, own.designs())
     covariance = covariance_of(information, neighbours)
     own_se = own.parameters.unit(own.p) * np.sqrt(np.diag(covariance))
     small = doubtful & (own_se <= _OF_GUESS * parameters.guess) & (fit.p * UNKNOWN <= own_se)
     return small, np.where(small, own_se, se)
-
-
-def estimated_near_zero(fit: Fit, equation_error: bool, compensate: bool) -> Fit:
-    """The estimate with those parameters on their own scale that may be 0; the same one where there are none, or where
-    that leads nowhere."""
-    found = attempted(lambda: near_zero(fit, uncertainty(fit).se)[0])
-    if fit.diverged or found is None or not found.any():
-        return fit
-    other = attempted(lambda: gated(_on_own_scale(fit, found).rows, fit.p, equation_error, compensate))
-    if other is None or not other.settled:
-        return fit
-    moved = attempted(lambda: _without_negative(other, found))
-    return fit if moved is None else moved
-
-
-def _without_negative(fit: Fit, which: Bool) -> Fit:
-    """The estimate with negative ones of those parameters at 0, and the others where they are likeliest then."""
-    found = uncertainty(fit)
-    negative = which & (fit.p < ALMOST_0 * found.se)
-    if not negative.any():
-        return fit
-    places = np.flatnonzero(negative)
-    gain = found.covariance[:, places] @ np.linalg.inv(found.covariance[np.ix_(places, places)])
-    step = gain @ (ALMOST_0 * found.se[places] - fit.p[places])
-    return fit.at(fit.parameters.moved(fit.p, np.where(fit.parameters.positive, step / fit.p, step)))
 
 
 def upper_bound(value: float, se: float) -> float:
@@ -93,7 +65,8 @@ def upper_bound(value: float, se: float) -> float:
     return max(value, 0.0) + se * normal.inv_cdf(1 - (1 - _CERTAINTY) * from_0)
 
 
-def _on_own_scale(fit: Fit, which: Bool) -> Fit:
+def on_own_scale(fit: Fit, which: Bool) -> Fit:
+    """The same estimate of the model with these parameters on their own scale."""
     rows: WeakRows = copy.copy(fit.rows)
     rows.compiled = on_their_own_scale(fit.rows.compiled, which)
     return Fit(fit.p, rows, fit.white, fit.errors, fit.start, fit.settled)

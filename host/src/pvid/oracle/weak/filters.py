@@ -1,4 +1,4 @@
-"""The front end before decimation: sums over blocks of samples, and short filters at the steps that correct them.
+"""Filters that give values and derivatives of signals: polynomials at the samples, and block sums before decimation.
 
 D samples make a step. The block sums are a comb filter of order 2, weights 1, 2, .., D, .., 2, 1 over D^2, with zeros
 where frequencies fold onto 0. A filter at the steps, a compensator, gives the value or a derivative from its output:
@@ -12,10 +12,15 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import legendre
 
 from pvid.base.errors import PvidError
 
 Float = npt.NDArray[np.float64]
+
+# Relative error of a filter at the edge of its band.
+_EDGE = 1e-4
+_FREQUENCIES = 2000  # at which the edge is sought
 
 # Frequencies at which a compensator is exact, over the highest frequency of the motion, by their number.
 _NODES = {2: (0.57, 1.05), 4: (0.3, 0.58, 0.85, 1.05)}
@@ -99,3 +104,24 @@ def at_samples(decimation: int, weights: tuple[float, ...]) -> Float:
     spread = np.zeros((len(weights) - 1) * decimation + 1)
     spread[::decimation] = weights
     return np.pad(np.convolve(spread, ramp), 1)
+
+
+@cache
+def polynomial_weights(taps: int, degree: int, order: int) -> Float:
+    """Weights [taps] of the derivative per step^order at the centre of a least-squares polynomial."""
+    half = (taps - 1) // 2
+    if half == 0:
+        return np.ones(1)
+    basis = legendre.legvander(np.arange(-half, half + 1) / half, degree)
+    at_centre = [legendre.legval(0.0, legendre.legder(one, order)) for one in np.eye(degree + 1)]
+    return np.asarray(np.array(at_centre) @ np.linalg.pinv(basis) / float(half) ** order)
+
+
+@cache
+def edge_of(taps: int, degree: int, order: int) -> float:
+    """Lowest frequency over the sample rate at which such a filter is off by more than _EDGE; one half: nowhere."""
+    weights, half = polynomial_weights(taps, degree, order), taps // 2
+    rates = np.linspace(0, 0.5, _FREQUENCIES + 1)[1:]
+    gain = np.exp(2j * np.pi * np.outer(rates, np.arange(-half, half + 1))) @ weights / (2j * np.pi * rates) ** order
+    off = np.abs(gain - 1) > _EDGE
+    return float(rates[np.argmax(off)]) if off.any() else 0.5
