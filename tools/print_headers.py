@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints what the host has from the public C headers: the enumerations as host/src/pvid/settings/enums.py, the settings
-of the estimator and of what judges it as host/src/pvid/settings/parts.py; the texts of firmware/src/judge/text.c; and the
-version. --check: only compares.
+of the estimator and of what judges it as host/src/pvid/settings/parts.py; the texts of firmware/src/judge/text.c; and
+the version. --check: only compares.
 
 Run it with build/venv/bin/python after a change of the headers, when ./tools/pvid has built the C core.
 """

@@ -247,7 +247,7 @@ def test_readme_is_short_and_begins_with_what_a_reader_runs() -> None:
 
 
 def test_the_pages_are_at_most_30000_words() -> None:
-    """Without programs, commands, what they print, the changelog, and what is made from the code: reference, mechanisms."""
+    """Without programs, commands, what they print, the changelog, and what is made from the code."""
     pages = [page for page in PAGES if page.parent.name not in (".github", "mechanisms")]
     read = [text_of(page) for page in pages if page.name not in ("api-python.md", "changelog.md")]
     prose = [re.sub(r"(?ms)^( *)```.*?^\1```|^ {4}[^\n]*", "", text) for text in read]

@@ -69,7 +69,9 @@ def run_once(line: str, folder: Path, full: bool, known: dict[tuple[str, ...], p
 
 def compile_c(block: pages.Block, folder: Path) -> None:
     """Syntax and types, with the headers that the page's commands have written."""
-    around = SURROUNDINGS.get(block.page.name, "") if "#include <" not in block.text else ""  # a whole program has its own
+    around = (
+        SURROUNDINGS.get(block.page.name, "") if "#include <" not in block.text else ""
+    )  # a whole program has its own
     (folder / "page.c").write_text(around + block.text, encoding="utf-8")
     generated = sorted({path.parent for path in folder.rglob("*_design_f32.h")})
     sizes: dict[str, int] = {}
