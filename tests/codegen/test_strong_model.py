@@ -210,6 +210,31 @@ def test_schedules_end_at_the_solution_of_all_rows(law: Law) -> None:
     assert all((np.abs(one - ends["exact"]) < share * se).all() for one in ends.values())
 
 
+@pytest.mark.parametrize(
+    ("divider", "exact"), [(1, 1), (1, 8), (8, 0), (7, 0)], ids=["exact", "lazy", "staged", "once"]
+)
+def test_beside_a_bound_the_others_are_those_of_the_constrained_estimate(divider: int, exact: int) -> None:
+    """With p_a held 5 standard errors off, b moves by the covariance of both over the variance of a."""
+    samples, _ = recorded("dc_motor")
+    base = config_of("dc_motor")
+    own = replace(base, estimator=replace(base.estimator, divider=divider), exact_every=exact)
+    free = strong_native(strong_of("dc_motor"), own).identifier_of(own)
+    ends = free.run_samples(samples, sums=False).p[-1]
+    covariance = free.assess()["covariance"][:7, :7].astype(float)
+    se = np.sqrt(np.diag(covariance))
+    correlation = np.abs(covariance / np.outer(se, se) - np.eye(7))
+    a, b = np.unravel_index(np.argmax(correlation), (7, 7))
+    assert correlation[a, b] > 0.3
+    lower = own.estimator.lower.copy()
+    lower[a] = ends[a] + 5 * se[a]
+    start = np.maximum(own.estimator.start, np.float32(1.01) * lower)
+    held = replace(own, estimator=replace(own.estimator, lower=lower, start=start))
+    found = strong_native(strong_of("dc_motor"), held).identifier_of(held).run_samples(samples, sums=False).p[-1]
+    moved = covariance[a] / covariance[a, a] * (lower[a] - ends[a])
+    assert found[a] == lower[a]
+    assert (np.abs(found - ends - moved) < 0.1 * se).all(), (found - ends - moved) / se
+
+
 def test_samples_beyond_a_row_are_refused_and_p_stays_finite() -> None:
     samples, _ = recorded("dc_motor")
     hostile = samples[:600].copy()
