@@ -7,13 +7,16 @@ import io
 import json
 import math
 import re
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import field_board
 import numpy as np
 import pytest
+from mechanisms import path_of
+from own_mechanisms import OWN, own_recording
 from program import pvid
 from rich.console import Console
 
@@ -31,97 +34,131 @@ from pvid.log.rig import mechanism_of_log, settings_text_of_log
 from pvid.log.status import StatusLine
 from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.enums import Reason, Stage
 from pvid.show.log_figure import write_log_figure
 from pvid.show.page_state import LiveState
 from pvid.show.view import LiveView
 
-TICKS = 4400  # of the pendulum's full equations: refined estimates are published from about 3600 on
 EVERY = 400  # ticks between estimates where all of them are compared
 
 
+@dataclass(frozen=True)
+class Case:
+    """A run of `ticks`: refined estimates are published from before `before` on. `truth` of the motion, and a value
+    whose standard error the second stage makes this many times as small."""
+
+    ticks: int
+    before: int
+    truth: Mapping[str, float]
+    tighter: tuple[str, float]
+
+
+PENDULUM = {"g": 9.5, "l2": 0.12, "rho2": 0.08, "k1": 0.0, "k2": 0.0, "tau": 0.0}
+CASES = {
+    "kapitza": Case(4400, 4000, PENDULUM, ("g", 0.3)),
+    "dc_motor": Case(2600, 2400, simulated_rig("dc_motor").truth, ("L", 0.3)),
+    "heated_plate": Case(2600, 2400, {"C": 100.0, "h": 0.5}, ("h", 0.5)),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
 @pytest.fixture(scope="module")
-def pendulum() -> MechanismBoard:
+def board(name: str) -> MechanismBoard:
     """The board of a rig; its sensors read a simulation of the full equations."""
-    board = MechanismBoard.of_guess(field_board.rig(), refined=True)
-    found = full_motion_of(compiled_of("kapitza"), TICKS / 1000 + 1)
-    return replace(board, recording=board.readings(found["y"], found["phi"])[:TICKS])
+    ticks = CASES[name].ticks
+    if name in OWN:
+        made = MechanismBoard.of_recording(
+            MechanismRig(OWN[name].path, OWN[name].rate), own_recording(name), refined=True
+        )
+    elif name == "kapitza":
+        made = MechanismBoard.of_guess(field_board.rig(), refined=True)
+        found = full_motion_of(compiled_of(name), ticks / 1000 + 1)
+        made = replace(made, recording=made.readings(found["y"], found["phi"]))
+    else:
+        made = MechanismBoard.of_shipped_rig(name, refined=True)
+    return replace(made, recording=made.recording[:ticks])
 
 
 @pytest.fixture(scope="module")
-def log(pendulum: MechanismBoard, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def log(board: MechanismBoard, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of a board on this machine."""
     out = tmp_path_factory.mktemp("refined") / "a.pvlog"
-    settings = settings_number(pendulum)
+    settings = settings_number(board)
     logger = Logger(
-        source=EmulatorSource(HOST_TARGET, lambda: open_target(HOST_TARGET, pendulum)),
+        source=EmulatorSource(HOST_TARGET, lambda: open_target(HOST_TARGET, board)),
         out=out,
-        rig=pendulum.text(),
-        samples=TICKS,
-        begin=lambda: pendulum.configure(settings, 100, 100, Source.SENSOR_PACED),
+        rig=board.text(),
+        samples=len(board.recording),
+        begin=lambda: board.configure(settings, 100, 100, Source.SENSOR_PACED),
     )
-    assert logger.run().samples == TICKS and logger.failures == []
+    assert logger.run().samples == len(board.recording) and logger.failures == []
     return out
 
 
 @pytest.fixture(scope="module")
-def published(pendulum: MechanismBoard) -> int:
+def published(name: str, board: MechanismBoard) -> int:
     """Ticks until the first refined estimate is published."""
-    stands = pendulum.both_stages().run_both(pendulum.recording).r[:, 0] > 0
+    stands = board.both_stages().run_both(board.recording).r[:, 0] > 0
     found = int(np.argmax(stands)) + 1
-    assert 3000 < found < 4000 and stands[found:].all()
+    assert 1000 < found < CASES[name].before and stands[found:].all()
     return found
 
 
-def verified(log: Path, records: list[Record] | None = None) -> Stretch:
+def verified(name: str, log: Path, records: list[Record] | None = None) -> Stretch:
     """The only stretch of a log, or of what was made of it."""
     text = settings_text_of_log(log)
     assert text is not None
-    (stretch,) = Verifier(board_of(text)).stretches(LogReader(log) if records is None else records)
+    (stretch,) = Verifier(board_of(text, path_of(name))).stretches(LogReader(log) if records is None else records)
     return stretch
 
 
-def test_text_in_a_log_gives_the_same_board_back(pendulum: MechanismBoard) -> None:
-    text = pendulum.text()
-    again = board_of(text)
+def test_text_in_a_log_gives_the_same_board_back(name: str, board: MechanismBoard) -> None:
+    text = board.text()
+    again = board_of(text, path_of(name))
     assert isinstance(again, MechanismBoard) and again.refine is not None and again.text() == text
-    assert settings_number(again) == settings_number(pendulum)
-    without = board_of("\n".join(line for line in text.split("\n") if not line.startswith("refine_")))
-    assert without is not None and settings_number(without) != settings_number(pendulum)
+    assert settings_number(again) == settings_number(board)
+    without = board_of("\n".join(line for line in text.split("\n") if not line.startswith("refine_")), path_of(name))
+    assert without is not None and settings_number(without) != settings_number(board)
     for wrong, right in (("refine_ratio", "refine_ratios"), ("refine_block", "refine_black")):
         with pytest.raises(PvidError, match="damaged"):
-            board_of(text.replace(f"{wrong} =", f"{right} ="))
+            board_of(text.replace(f"{wrong} =", f"{right} ="), path_of(name))
 
 
-@pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
-def test_a_board_computes_the_bits_of_this_machine(pendulum: MechanismBoard, published: int, target: str) -> None:
-    with open_target(target, pendulum) as opened:
-        record = collect(opened, TICKS, begin=pendulum, hash_every=EVERY, estimate_every=EVERY)
-    own = pendulum.both_stages()
+@pytest.mark.parametrize(
+    ("name", "target"), [*((name, HOST_TARGET) for name in CASES), ("dc_motor", "mps2-an386")], indirect=["name"]
+)
+def test_a_board_computes_the_bits_of_this_machine(board: MechanismBoard, published: int, target: str) -> None:
+    ticks, n, sent = len(board.recording), len(board.compiled.p_names), list(board.shown)
+    with open_target(target, board) as opened:
+        record = collect(opened, ticks, begin=board, hash_every=EVERY, estimate_every=EVERY)
+    own = board.both_stages()
     stages = {}
-    for tick in range(EVERY, TICKS, EVERY):  # those behind the last sample may be lost
-        assert record.hashes[tick] == own.run_both(pendulum.recording[tick - EVERY : tick]).hash[-1], tick
+    for tick in range(EVERY, ticks, EVERY):  # those behind the last sample may be lost
+        assert record.hashes[tick] == own.run_both(board.recording[tick - EVERY : tick]).hash[-1], tick
         found, (stage, best) = record.refined[tick], own.best
         assert found.stage == stage and found.reason == own.refinement.told
-        assert np.array_equal(np.array(found.p[:4], np.float32), best["p"][:4])
-        covariance = found.of_p[1][:4, :4]
-        assert np.array_equal(np.array(covariance, np.float32), best["covariance"][:4, :4])
-        refined = own.refined
-        r, se = (np.zeros(7), np.zeros(7)) if refined is None else (refined["r"], refined["se"])
-        assert np.array_equal(np.array(found.r[:7], np.float32), r) and np.array_equal(
-            np.array(found.se[:7], np.float32), se
-        )
-        assert record.estimates[tick].p[:4] == tuple(own.estimate["p"][:4].tolist())
+        assert np.array_equal(np.array(found.p[:n], np.float32), best["p"][:n])
+        assert np.array_equal(np.array(found.of_p[1][:n, :n], np.float32), best["covariance"][:n, :n])
+        for given, key in ((found.r, "r"), (found.se, "se")):
+            wanted = np.zeros(len(sent)) if own.refined is None else own.refined[key][sent]
+            assert np.array_equal(np.array(given[: len(sent)], np.float32), wanted)
+        assert record.estimates[tick].p[:n] == tuple(own.estimate["p"][:n].tolist())
         stages[tick] = found.stage
     assert stages == {tick: Stage.REFINED if tick >= published else Stage.WEAK for tick in stages}
     assert set(stages.values()) == set(Stage)
 
 
-def test_log_is_verified_in_both_stages(log: Path) -> None:
+def test_log_is_verified_in_both_stages(name: str, log: Path) -> None:
     verdict = Verdict()
-    verdict.add(verified(log))
-    assert verdict.different == 0 and verdict.verified == TICKS
-    assert verdict.checked == 3 * TICKS // 100  # an estimate of each stage and a hash
+    verdict.add(verified(name, log))
+    assert verdict.different == 0 and verdict.verified == CASES[name].ticks
+    assert verdict.checked == 3 * CASES[name].ticks // 100  # an estimate of each stage and a hash
     records = list(LogReader(log))
     refined = [one.item for one in records if isinstance(one.item, RefinedEstimate)]
     assert refined[-1].number == 1 and refined[-1].stage == Stage.REFINED and refined[-1].reason == Reason.UPDATED
@@ -129,17 +166,24 @@ def test_log_is_verified_in_both_stages(log: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "variable"),
-    [("p", "published w"), ("r", "refined r[0]"), ("se", "refined se[0]"), ("stage", "stage"), ("number", "number of")],
+    ("name", "key", "variable"),
+    [
+        ("kapitza", "p", "published w"),
+        ("dc_motor", "r", "refined r[0]"),
+        ("heated_plate", "se", "refined se[0]"),
+        ("dc_motor", "stage", "stage"),
+        ("heated_plate", "number", "number of"),
+    ],
+    indirect=["name"],
 )
-def test_a_changed_refined_estimate_is_found(log: Path, name: str, variable: str) -> None:
+def test_a_changed_refined_estimate_is_found(name: str, log: Path, key: str, variable: str) -> None:
     records = list(LogReader(log))
     at = max(i for i, one in enumerate(records) if isinstance(one.item, RefinedEstimate))
     estimate = records[at].item
-    value: Any = getattr(estimate, name)
+    value: Any = getattr(estimate, key)
     changed = value + 1 if isinstance(value, int) else (float(np.nextafter(np.float32(value[0]), 0)), *value[1:])
-    records[at] = replace(records[at], item=replace(estimate, **{name: changed}))  # type: ignore[arg-type]
-    stretch = verified(log, records)
+    records[at] = replace(records[at], item=replace(estimate, **{key: changed}))  # type: ignore[arg-type]
+    stretch = verified(name, log, records)
     assert stretch.difference is not None and stretch.difference.variable.startswith(variable)
 
 
@@ -167,8 +211,10 @@ def test_a_shipped_rig_has_both_stages_of_its_full_equations() -> None:
 # ---- what shows both stages
 
 
-def test_export_has_columns_of_both_stages(log: Path, published: int, tmp_path: Path) -> None:
-    mechanism = mechanism_of_log(log)
+def test_export_has_columns_of_both_stages(
+    name: str, board: MechanismBoard, log: Path, published: int, tmp_path: Path
+) -> None:
+    mechanism, case, refined_names = mechanism_of_log(log), CASES[name], board.names.refined
     paths = export_log(log, "csv", tmp_path / "a", mechanism)
     assert [one.name for one in paths] == [
         *(f"a-{table}.csv" for table in ("samples", "estimates", "status", "events", "refined")),
@@ -179,15 +225,20 @@ def test_export_has_columns_of_both_stages(log: Path, published: int, tmp_path: 
     for row in refined:
         stands = int(row["tick"]) >= published
         assert row["stage"] == ("refined" if stands else "weak") and int(row["number"]) == int(stands)
-        for name in ("w", "g", "l2", "c", "k1", "tau", "w_se", "g_se", "k2_se", "level"):
-            assert math.isfinite(float(row[name])) == stands, (row["tick"], name)
-    last, truth = refined[-1], {"g": 9.5, "l2": 0.12, "rho2": 0.08, "k1": 0.0, "k2": 0.0, "tau": 0.0}
-    for name, value in truth.items():
-        assert abs(float(last[name]) - value) < 4 * float(last[f"{name}_se"]), name
-    assert float(last["g_se"]) < 0.3 * float(weak[-1]["g_se"]) and last["reason"] == "updated"
+        for one in (*case.truth, *board.compiled.p_names, *(one.name for one in refined_names)):
+            assert math.isfinite(float(row[one])) == math.isfinite(float(row[f"{one}_se"])) == stands, (
+                row["tick"],
+                one,
+            )
+        assert math.isfinite(float(row["level"])) == stands
+    last, (sharp, share) = refined[-1], case.tighter
+    for one, value in case.truth.items():
+        assert abs(float(last[one]) - value) < 4 * float(last[f"{one}_se"]), one
+    assert float(last[f"{sharp}_se"]) < share * float(weak[-1][f"{sharp}_se"]) and last["reason"] == "updated"
     about = json.loads((tmp_path / "a-metadata.json").read_text())
     units = {one["name"]: one["unit"] for one in about["tables"][-1]["tableSchema"]["columns"]}
-    assert (units["k1"], units["tau"], units["rho2_se"]) == ("1/s", "s", "m")
+    for quantity in refined_names:
+        assert units[quantity.name] == units[f"{quantity.name}_se"] == (quantity.unit or "1"), quantity
     for form in ("npz", "mcap", "parquet"):
         written = export_log(log, form, tmp_path / "b", mechanism)
         assert len(written) == (5 if form == "parquet" else 1)
@@ -195,10 +246,14 @@ def test_export_has_columns_of_both_stages(log: Path, published: int, tmp_path: 
     assert np.array_equal(arrays["refined.tick"], arrays["estimates.tick"])
 
 
-def test_page_and_terminal_show_both_curves_and_which_is_published(log: Path, published: int) -> None:
+def test_page_and_terminal_show_both_curves_and_which_is_published(
+    name: str, board: MechanismBoard, log: Path, published: int
+) -> None:
     state, stream, data = LiveState(log, "both"), LogStream(), log.read_bytes()
     view = LiveView(Console(width=110, file=io.StringIO()), "both")
-    half = len(data) // 2
+    half, (sharp, share) = len(data) // 2, CASES[name].tighter
+    of_model = [*(one.name for one in board.compiled.outputs), *board.compiled.p_names]
+    extra = [one.name for one in board.names.refined if one.name not in of_model]
     for first in (0, half):
         part = data[first:] if first else data[:half]
         state.take(part)
@@ -208,34 +263,47 @@ def test_page_and_terminal_show_both_curves_and_which_is_published(log: Path, pu
         console = Console(width=110, file=io.StringIO())
         console.print(view.panel(stream.account, 1.0))
         text = console.file.getvalue()  # type: ignore[attr-defined]
-        curve = shown["estimates"]["curves"][0]
+        curve = next(one for one in shown["estimates"]["curves"] if one["label"].split()[0] == sharp)
         assert len(curve["refinedValue"]) == len(curve["value"]) == len(shown["estimates"]["t"])
         names_shown = [row["name"] for row in shown["parameters"]]
         if first == 0:
-            assert shown["stage"] == "the weak form's; the refinement: the first window of samples is not full yet"
-            assert not any(x is not None for x in curve["refinedValue"]) and "k1" not in names_shown
+            assert shown["stage"].startswith("the weak form's; the refinement: ")
+            assert not any(x is not None for x in curve["refinedValue"]) and names_shown == of_model
     assert shown["stage"] == "the refined one" and re.search(r"published +the refined one", text)
-    assert names_shown == ["g", "l2", "rho2", "w", "d1", "d2", "c", "k1", "k2", "tau"]
+    assert names_shown == [*of_model, *extra]
     refined = [x for x in curve["refinedValue"] if x is not None]
-    assert len(refined) == (TICKS - published) // 100 + 1 and None not in curve["refinedValue"][-len(refined) :]
+    assert (
+        len(refined) == (CASES[name].ticks - published) // 100 + 1
+        and None not in curve["refinedValue"][-len(refined) :]
+    )
     assert curve["refinedLow"][-1] < refined[-1] < curve["refinedHigh"][-1]
-    assert refined[-1] - curve["refinedLow"][-1] < 0.3 * (curve["value"][-1] - curve["low"][-1])
+    assert refined[-1] - curve["refinedLow"][-1] < share * (curve["value"][-1] - curve["low"][-1])
     assert curve["limits"][0] < curve["refinedLow"][-1] and curve["limits"][1] > curve["refinedHigh"][-1]
-    assert float(shown["parameters"][0]["value"]) == pytest.approx(refined[-1], rel=1e-3)
+    of_sharp = shown["parameters"][names_shown.index(sharp)]
+    prefix = float(of_sharp["value"].split()[0]) / refined[-1]  # 1000 of mH
+    assert prefix == pytest.approx(1000.0 ** round(math.log(prefix, 1000)), rel=1e-3)
 
 
-def test_figure_shows_both_curves_and_which_is_published(log: Path, tmp_path: Path) -> None:
+def test_figure_shows_both_curves_and_which_is_published(
+    name: str, board: MechanismBoard, log: Path, tmp_path: Path
+) -> None:
     assert write_log_figure(log, mechanism_of_log(log), tmp_path / "b.svg")
     drawn = (tmp_path / "b.svg").read_text()
-    for words in ("weak form", "refined, published where drawn", "published: the refined one", "tau"):
+    for words in (
+        "weak form",
+        "refined, published where drawn",
+        "published:",
+        board.names.refined[-1].name,
+    ):
         assert words in drawn, words
 
 
-def test_status_line_has_the_published_estimate(log: Path) -> None:
+def test_status_line_has_the_published_estimate(name: str, board: MechanismBoard, log: Path) -> None:
     line, stream = StatusLine(io.StringIO()), LogStream()
     texts = []
     for record in stream.feed(log.read_bytes()):
         line.take(record, stream.account)
         if isinstance(record.item, RefinedEstimate):
             texts.append(line.line(stream.account, 1.0))
-    assert texts[10].endswith("warming up") and texts[-1].endswith(", refined") and "tick 4400: w 31.6" in texts[-1]
+    assert not texts[10].endswith(", refined") and texts[-1].endswith(", refined")
+    assert f"tick {CASES[name].ticks}: {board.compiled.p_names[0]} " in texts[-1]
