@@ -69,6 +69,7 @@ SHOWN = (
     ("link-and-log.md", r"COBS", "the layout of a frame; tests/link"),
     ("link-and-log.md", r"pvid 1", "the schema; tools/docs.py"),
     ("models.md", r"t,V,i,phi", "a recording"),
+    ("python.md", r"@misc", "BibTeX, as .github/CITATION.cff"),
     ("README.md", r"Simulated: ", "tools/pvid bench demo"),
     ("models.md", r"add_subdirectory", "CMake; tests/tools/test_consumer.py"),
     ("porting.md", r"set\(", "CMake; tests/board/test_port.py"),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pyarrow.parquet
@@ -162,7 +164,8 @@ def test_a_drift_is_named_and_chance_is_not() -> None:
     assert b.drifts and b.slope is not None and b.slope_se is not None and abs(b.slope - 0.002) < 4 * b.slope_se
     assert a.scatter is not None and 0.5 < a.scatter < 1.7
     text = page([*still, *moving, *doubted], "<fleet>")
-    assert text.count('class="alarm"') == 1 and "&lt;fleet&gt;" in text and "http" not in text.split("<svg")[0]
+    marked = '<strong class="bad">moving</strong>'
+    assert text.count(marked) == 1 and "&lt;fleet&gt;" in text and "http:" not in text.split("<svg")[0]
 
 
 def test_scale_that_a_board_has_in_common_hides_no_drift() -> None:
@@ -171,6 +174,28 @@ def test_scale_that_a_board_has_in_common_hides_no_drift() -> None:
     moving = [row("moving", k, 9.5 + 0.002 * k + noise[k], 0.3) for k in range(30)]
     assert not drifts_of(moving)[0].drifts
     assert drifts_of([replace(one, se_apart={"g": 0.01}) for one in moving])[0].drifts
+
+
+def test_a_report_of_each_recording_is_linked_and_written_again_where_it_is_gone(
+    tmp_path: Path, inline: list[str]
+) -> None:
+    recording, model = own_recording("heated_plate"), str(OWN["heated_plate"].path)
+    name = "a <b> & c.npz"
+    np.savez(tmp_path / name, t=recording.t, P=recording.signals["P"], T=recording.signals["T"])
+    (tmp_path / "broken.csv").write_text("t,P,T\n0,one,two\n")
+    words = ["batch", str(tmp_path / name), str(tmp_path / "broken.csv"), "-o", str(tmp_path / "fleet.parquet")]
+    words += ["--model", model, "--report", str(tmp_path / "reports"), "--workers", "1"]
+    for _ in range(3):
+        done = CliRunner().invoke(commands, words, standalone_mode=False, catch_exceptions=False)
+        assert done.return_value == DONE
+        text = (tmp_path / "fleet.html").read_text()
+        (link,) = re.findall(r'<a href="([^"]*)">([^<]*a &lt;b&gt; &amp; c.npz)</a>', text)
+        report = tmp_path / unquote(link[0])
+        assert report.parent == tmp_path / "reports" and "Heated plate" in report.read_text()
+        if len(inline) == 3:
+            report.unlink()
+    done_of_it = [one for one in inline if one.endswith(name)]
+    assert len(done_of_it) == 2  # the second call found its report, the third did not
 
 
 def test_outcomes_are_counted() -> None:

@@ -15,11 +15,11 @@ import pvid
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.identification.analysis import analysed
-from pvid.identification.judge import judged, with_sensors
+from pvid.identification.judge import judged, with_unseen
 from pvid.identification.refinement.inputs import second_derivative_of
 from pvid.identification.road import identified
 from pvid.identification.sensor_prediction import SensorPrediction
-from pvid.identification.validation import validated
+from pvid.identification.validation import Validation, validated
 from pvid.model import sgn
 from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
@@ -58,8 +58,12 @@ def test_poor_prediction_of_an_explained_run_is_a_doubt_where_it_is_more_than_no
     assert answer.verdict.word == "good"
     good = SensorPrediction("i", "A", 1e-3, 0.01, 1.0)
     noisy, poor = (SensorPrediction("phi", "rad", 1e-3, 0.7, of_noise) for of_noise in (1.2, 8.0))
-    assert with_sensors(answer, (good, noisy)).verdict == answer.verdict
-    doubted = with_sensors(answer, (good, poor))
+
+    def predicted(*sensors: SensorPrediction) -> Validation:
+        return Validation(sensors, 1.0, 1, np.zeros(0), {}, {})
+
+    assert with_unseen(answer, predicted(good, noisy)).verdict == answer.verdict
+    doubted = with_unseen(answer, predicted(good, poor))
     assert doubted.verdict.word == "not_explained" and doubted.prediction == (good, poor)
     assert "predicts 51 % of phi" in str(doubted.verdict.warning)
     assert {one.word for one in doubted.values.values()} == {"not_explained"}

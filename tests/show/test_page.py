@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from browser import chromium
 from click.testing import CliRunner
+from conftest import ROOT
 from selenium import webdriver
 
 from pvid.base.errors import PvidError
@@ -42,7 +43,7 @@ def sent() -> list[bytes]:
 def get(address: str, path: str = "", host: str | None = None) -> bytes:
     """What the server answers."""
     request = urllib.request.Request(address + path, headers={} if host is None else {"Host": host})
-    with urllib.request.urlopen(request, timeout=20) as answer:
+    with urllib.request.urlopen(request, timeout=120) as answer:
         return bytes(answer.read())
 
 
@@ -392,6 +393,23 @@ def test_view_serves_a_log_until_it_is_interrupted(finished: Path) -> None:
     until(lambda: f"{TICKS} samples" in received(line.split()[0]))
     program.send_signal(signal.SIGINT)
     assert program.wait(20) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"), [("former_motor_weak", "What the board published"), ("", "There is no report")]
+)
+def test_the_page_has_a_report_of_what_is_recorded(name: str, shown: str, tmp_path: Path) -> None:
+    log = tmp_path / "run.pvlog"
+    if name:
+        log.write_bytes((ROOT / "tests" / "data" / "logs" / f"{name}.pvlog").read_bytes())
+    with page("127.0.0.1:0", log, "a log") as address:
+        assert b'href="report"' in get(address)
+        try:
+            text = get(address, "report")
+        except urllib.error.HTTPError as error:
+            assert error.code == 422
+            text = error.read()
+    assert shown in text.decode() and ("Parts of the error" in text.decode()) == bool(name)
 
 
 def test_ports_lists_the_emulated_boards() -> None:

@@ -5,7 +5,7 @@ reads recorded runs and proves, bit for bit, that the C code and numpy compute t
 
     result = pvid.identify("run.csv", l1=0.25)       # or a data frame, or a dict of arrays
     result.parameters["g"].value, result.parameters["g"].se, result.identified, result.warning
-    result.plot("run.png")
+    result.report("run.html")
 
 `pvid.Model` and `pvid.sgn` describe a mechanism of your own; `pvid.Estimator` estimates the parameters of your own rows
 on the C core.
@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 from pvid.base.version import __version__
 
-__all__ = ["Estimator", "Model", "PvidError", "Result", "__version__", "identify", "sgn"]
+__all__ = ["Estimator", "Model", "PvidError", "Result", "__version__", "identify", "load", "sgn"]
 
 if TYPE_CHECKING:
     from pvid.api.estimator import Estimator
     from pvid.api.identify import identify
-    from pvid.api.result import Result
+    from pvid.api.result import Result, load
     from pvid.base.errors import PvidError
     from pvid.model.description import Model
     from pvid.model.signals import sgn
@@ -35,6 +35,7 @@ _HOMES = {
     "PvidError": "pvid.base.errors",
     "Result": "pvid.api.result",
     "identify": "pvid.api.identify",
+    "load": "pvid.api.result",
     "sgn": "pvid.model.signals",
 }
 

@@ -17,8 +17,10 @@ from pvid.identification.analysis import own_of
 from pvid.identification.core import identify_in_c
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
+from pvid.identification.summary import Made
 from pvid.log.rig import source_of
 from pvid.log.rig_choice import common_rig, rig_of
+from pvid.model.description import Model
 from pvid.rig.run import recording_of_arrays
 from pvid.rig.together import names_of
 from pvid.settings.cores import CORES
@@ -27,7 +29,7 @@ from pvid.settings.cores import CORES
 def identify(
     data: Data | Sequence[Data],
     *,
-    model: str | os.PathLike[str] | None = None,
+    model: str | os.PathLike[str] | Model | None = None,
     rig: str | os.PathLike[str] | None = None,
     columns: str | None = None,
     core: Literal["f32", "q31", "f64"] | None = None,
@@ -46,8 +48,8 @@ def identify(
         to arrays, shape (n,): the time t [s] and the signals of the mechanism. A list of these is several recordings
         that are identified together: their parameters are the same.
     model
-        A mechanism of `pvid models` or a model file; by default that of the rig file, else the shipped one with the
-        signals of the data.
+        A mechanism of `pvid models`, a model file or a `pvid.Model`; by default that of the rig file, else the shipped
+        one with the signals of the data.
     rig
         The rig file; RUN.toml beside RUN.csv by default.
     columns
@@ -84,7 +86,7 @@ def identify(
 
 def _identify(
     data: Data | Sequence[Data],
-    model: str | os.PathLike[str] | None,
+    model: str | os.PathLike[str] | Model | None,
     rig: str | os.PathLike[str] | None,
     columns: str | None,
     core: Literal["f32", "q31", "f64"] | None,
@@ -98,7 +100,7 @@ def _identify(
         raise PvidError("data: the list of recordings is empty")
     paths = [Path(one) if isinstance(one, str | os.PathLike) else None for one in several]
     texts = tuple(f"{key}={_toml(value)}" for key, value in settings.items())
-    rig_path, asked = None if rig is None else Path(rig), None if model is None else os.fspath(model)
+    rig_path, asked = None if rig is None else Path(rig), model
     files = [one for one in paths if one is not None]
     if files:
         found = common_rig(files, rig_path, texts, asked, columns)
@@ -111,9 +113,19 @@ def _identify(
     recording, compiled = read_all(found, sources, _names(paths), columns)
     in_c = CORES.get(core or "")
     of_each = own_of(compiled, recording, own, shared, in_c=in_c is not None)
-    if in_c is None:
-        return result_of(identified(recording, compiled, refine=refine, own=of_each))
-    return result_of(identify_in_c(identified(recording, compiled, refine=False, own=of_each), in_c.name))
+    answer = identified(recording, compiled, refine=False if in_c else refine, own=of_each)
+    options = {"model": model, "rig": rig, "columns": columns, "core": core, "refine": refine, **settings}
+    made = Made.of(_call(paths, options), files, rig_path, found)
+    return result_of(answer if in_c is None else identify_in_c(answer, in_c.name), made)
+
+
+def _call(paths: Sequence[Path | None], options: Mapping[str, Any]) -> str:
+    """Of `identify`, in words of Python."""
+    data = [repr(str(one)) if one is not None else "data" for one in paths]
+    named = {name: one.title if isinstance(one, Model) else one for name, one in options.items() if one is not None}
+    given = [f"{name}={one if isinstance(one, bool | float | int) else repr(str(one))}" for name, one in named.items()]
+    first = data[0] if len(data) == 1 else f"[{', '.join(data)}]"
+    return f"pvid.identify({', '.join([first, *given])})"
 
 
 def _names(paths: Sequence[Path | None]) -> tuple[str, ...]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib.util
+import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,28 +18,53 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.api.data import Data, recording_of
+from pvid.base.atomic_write import write_whole
+from pvid.base.errors import PvidError
+from pvid.base.packages import installing
 from pvid.base.replacing import replacing
 from pvid.base.rounding import with_error
-from pvid.identification.answer import Analysis
-from pvid.identification.core import CoreAnswer
+from pvid.base.toml_text import toml_document
+from pvid.base.wording import reason
+from pvid.identification.answer import LEVEL, Answer, interval_of
+from pvid.identification.summary import Made, Shown, shown, summary
 from pvid.model.compiled import CompiledModel
+from pvid.model.description import Model
+from pvid.model.readable import aligned, latex_name, latex_unit
+from pvid.models.mechanisms import compiled_of
+from pvid.models.registry import asked_for, shipped
 from pvid.oracle.weak.words import Word
 from pvid.rig.columns import parsed
-from pvid.rig.mechanism_file import channels_of
+from pvid.rig.mechanism_file import MechanismRig, channels_of, parsed_file
 from pvid.rig.run import Recording
 
 if TYPE_CHECKING:
     from pvid.identification.validation import Validation
 
+Float = npt.NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Parameter:
-    """A value with its standard error `se`, both in `unit` (SI), and its `verdict`, as that of a `Result`."""
+    """A value with its standard error `se`, both in `unit` (SI), and its `verdict`, as that of a `Result`.
+
+    below : it is below this with 95 %, where it may be 0
+    """
 
     value: float
     se: float
     unit: str
     verdict: Word = "good"
+    below: float | None = None
+
+    @property
+    def shown(self) -> Shown | None:
+        """As a person reads it, with its 95 % interval."""
+        return shown(self)
+
+    def interval(self, level: float = LEVEL) -> tuple[float, float]:
+        """In which it is with this probability [unit]."""
+        _refuse_level(level)
+        return interval_of(self.value, self.se, self.below, level)
 
     def __str__(self) -> str:
         value, error = with_error(self.value, self.se)
@@ -63,6 +92,7 @@ class Result:
     advice : a sentence each, with what to type, where a column seems to be wrong
     notes : what was done to the data, a sentence each
     details : everything, as `pvid identify --json` prints it
+    covariance : of the parameters, in their order [n, n]; its diagonal is their squared standard errors
     """
 
     identified: bool
@@ -73,8 +103,10 @@ class Result:
     advice: tuple[str, ...]
     notes: tuple[str, ...]
     details: Mapping[str, Any]
-    _answer: Analysis | CoreAnswer
+    covariance: Float
     _model: CompiledModel
+    _answer: Answer | None = None
+    _made: Made = Made("")
 
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -103,10 +135,136 @@ class Result:
     def _repr_html_(self) -> str:
         if not self.identified:
             return f"<p>{escape(str(self)).replace(chr(10), '<br>')}</p>"
-        rows = "".join(
-            f"<tr><td>{escape(name)}</td><td>{escape(str(one))}</td></tr>" for name, one in self.parameters.items()
-        )
-        return f"<table>{rows}</table>" + "".join(f"<p>{escape(one)}</p>" for one in self._doubts)
+        rows = ["<tr><th>parameter</th><th>value</th><th>95 % interval</th></tr>"]
+        for name, one in self.parameters.items():
+            cells = (name, *(one.shown.texts if one.shown is not None else ("", "")))
+            rows.append(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>")
+        return f"<table>{''.join(rows)}</table>" + "".join(f"<p>{escape(one)}</p>" for one in self._doubts)
+
+    def _repr_latex_(self) -> str:
+        rows = []
+        for name, one in self.parameters.items():
+            if (told := one.shown) is not None:
+                power = rf" \cdot 10^{{{told.power}}}" if told.power else ""
+                value, ends = f"{told.value}{power}", rf"[{told.low}, {told.high}]{power}"
+                rows.append(rf"{latex_name(name)} &= {value}\;{latex_unit(told.unit)} \quad {ends}")
+        return f"${aligned(rows)}$" if rows else str(self)
+
+    @property
+    def params(self) -> dict[str, float]:
+        """The values by name."""
+        return {name: one.value for name, one in self.parameters.items()}
+
+    @property
+    def correlation(self) -> Float:
+        """Of the parameters, in their order [n, n]: the covariance over the standard errors."""
+        se = np.array([one.se for one in self.parameters.values()])
+        return np.divide(self.covariance, np.outer(se, se), out=np.eye(len(se)), where=np.outer(se, se) > 0)
+
+    def interval(self, level: float = LEVEL) -> dict[str, tuple[float, float]]:
+        """By parameter: the interval in which it is with this probability, from 0 to 1."""
+        return {name: one.interval(level) for name, one in self.parameters.items()}
+
+    @property
+    def residuals(self) -> dict[str, Float]:
+        """Measured less predicted samples of this recording by sensor, and their times "t" [s], shape (n,) each; NaN
+        where a sample is missing. Blocks of it are simulated by the full equations, from starts that are fitted: the
+        last samples, which fill no block, are left out.
+
+        Raises
+        ------
+        PvidError
+            Where a parameter has no value, the motion runs away, or the result was loaded from a file.
+        """
+        recording = self._identified_here("residuals").recording
+        found = self._validated(recording)
+        return {"t": found.t} | {name: found.measured[name] - found.simulated[name] for name in found.measured}
+
+    @property
+    def unseen(self) -> Validation | None:
+        """How motion is predicted that was not fitted, in this recording: as of `validate`; None: it was not looked
+        at."""
+        return self._identified_here("predictions").unseen
+
+    def summary(self) -> str:
+        """The answer in words, the values with their 95 % intervals, the doubts and the advice: the text of the report.
+
+        Raises
+        ------
+        PvidError
+            Where the result was loaded from a file.
+        """
+        return summary(self._identified_here("words"))
+
+    def to_frame(self) -> Any:
+        """A data frame (pandas) with a row for each parameter: value, se, low and high of the 95 % interval, unit,
+        verdict, and the parts of the standard error.
+
+        Raises
+        ------
+        PvidError
+            Where pandas is not installed.
+        """
+        if importlib.util.find_spec("pandas") is None:
+            raise PvidError(f"to_frame needs pandas: {installing('pandas')}")
+        import pandas as pd
+
+        rows = {
+            name: {"value": one.value, "se": one.se, **dict(zip(("low", "high"), one.interval(), strict=True))}
+            | {"unit": one.unit, "verdict": one.verdict}
+            | {part: self.details["parameters"][name][part] for part in ("se_noise", "se_scale", "se_model")}
+            for name, one in self.parameters.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
+        """Writes the result as JSON: the object of `pvid identify --json`, with the covariance and the rig, for `load`
+        and for `pvid validate --from`. Returns the path.
+
+        Parameters
+        ----------
+        force : replace a file that pvid did not write, too
+
+        Raises
+        ------
+        PvidError
+            When it cannot be written, or there is such a file.
+        """
+        own = {"covariance": self.covariance.tolist(), "names": list(self.parameters), "rig": self._made.settings}
+        out = Path(path)
+        with replacing(force), _writing(out):
+            write_whole(out, json.dumps({**self.details, "saved": own | {"notes": list(self.notes)}}) + "\n")
+        return out
+
+    def report(self, path: str | Path, *, force: bool = False) -> Path:
+        """Writes the report: one HTML page with the answer in words, measured against predicted motion that was not
+        fitted, what is missing, the parts of the errors, and how it was made. Returns its path.
+
+        Parameters
+        ----------
+        force : replace a file that pvid did not write, too
+
+        Raises
+        ------
+        PvidError
+            When it cannot be written, there is such a file, or the result was loaded from a file.
+        """
+        answer, out = self._identified_here("report"), Path(path)
+        with replacing(force):
+            from pvid.show.report import write_report  # loads matplotlib
+
+            write_report(answer, self._made, out)
+        return out
+
+    def _identified_here(self, what: str) -> Answer:
+        if self._answer is None:
+            raise PvidError(f"a result from a file has no {what}: they need the recording; identify it again")
+        return self._answer
+
+    def _validated(self, recording: Recording) -> Validation:
+        from pvid.identification.validation import predicted
+
+        return predicted(self._model, recording, self.params, self.details.get("window_s"))
 
     def plot(self, path: str | Path, *, force: bool = False) -> Path:
         """Writes a figure of the estimates over time, with the answer and its standard errors, and of the measured
@@ -125,7 +283,7 @@ class Result:
         with replacing(force):
             from pvid.show.answer_figure import write_figure
 
-            write_figure(self._answer, out)
+            write_figure(self._identified_here("figure"), out)
         return out
 
     def validate(self, data: Data, *, columns: str | None = None) -> Validation:
@@ -145,12 +303,9 @@ class Result:
         PvidError
             Where the data cannot be read, or a parameter has no value.
         """
-        from pvid.identification.validation import predicted
+        return self._validated(self._recording(data, columns))
 
-        values = {name: one.value for name, one in self.parameters.items()}
-        return predicted(self._model, self._recording(data, columns), values, self.details.get("window_s"))
-
-    def predict(self, data: Data, *, columns: str | None = None) -> dict[str, npt.NDArray[np.float64]]:
+    def predict(self, data: Data, *, columns: str | None = None) -> dict[str, Float]:
         """The sensors as these parameters predict them: the whole recording is simulated by the full equations under
         its recorded inputs, from the start that fits it best.
 
@@ -170,8 +325,7 @@ class Result:
         """
         from pvid.identification.validation import p_of, simulation_of
 
-        values = {name: one.value for name, one in self.parameters.items()}
-        return simulation_of(self._model, self._recording(data, columns), p_of(self._model, values))
+        return simulation_of(self._model, self._recording(data, columns), p_of(self._model, self.params))
 
     def _recording(self, data: Data, columns: str | None) -> Recording:
         path = Path(data) if isinstance(data, str | os.PathLike) else None
@@ -196,24 +350,72 @@ class Result:
         return self[name].se if noise is None else math.hypot(noise, model or 0.0)
 
 
-def result_of(found: Analysis | CoreAnswer) -> Result:
+def result_of(found: Answer, made: Made | None = None) -> Result:
     """What a user sees of an answer."""
-    details, verdict = found.as_json(), found.verdict
+    details = found.as_json()
+    notes = (*found.recording.notes, *(one.text for one in found.verdict.reasons if not one.alarm))
+    return _of_details(details, notes, found.covariance_of_values, found.model, found, made or Made(""))
+
+
+def load(path: str | os.PathLike[str], *, model: str | os.PathLike[str] | Model | None = None) -> Result:
+    """A result that `Result.save` wrote. It predicts and validates; what needs its recording, it does not have.
+
+    Parameters
+    ----------
+    model : the model file, or the `pvid.Model`, of a mechanism that is not shipped: what a file names is never run
+
+    Raises
+    ------
+    PvidError
+        Where the file is none, or is of another mechanism than `model`.
+    """
+    return parsed_file(Path(path), partial(_loaded, model=model))
+
+
+def _loaded(text: str, model: str | os.PathLike[str] | Model | None) -> Result:
+    """What `load` finds in the text of a file, which may be anything."""
+    none = "it is not what Result.save writes"
+    try:
+        details = json.loads(text)
+        own = details.pop("saved")
+        rig = MechanismRig.of_document(toml_document(own["rig"]), None if model is None else asked_for(model))
+        of = compiled_of(shipped(rig.model, "the file") if isinstance(rig.model, str) else rig.model)
+        if details["model"] != of.name:
+            raise PvidError(f"it is of the mechanism {details['model']}, not of {of.name}")
+        covariance, notes = np.array(own["covariance"], np.float64), tuple(map(str, own["notes"]))
+        result = _of_details(details, notes, covariance, rig.applied(of), None, Made("", (), own["rig"]))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise PvidError(f"{none}: {reason(error)}") from error
+    if covariance.size != len(result.parameters) ** 2:
+        raise PvidError(f"{none}: covariance and parameters differ in number")
+    return result
+
+
+def _of_details(
+    details: dict[str, Any],
+    notes: tuple[str, ...],
+    covariance: Float,
+    model: CompiledModel,
+    answer: Answer | None,
+    made: Made,
+) -> Result:
     known = {
-        name: Parameter(one["value"], one["se"], one["unit"], one["verdict"])
+        name: Parameter(one["value"], one["se"], one["unit"], one["verdict"], one.get("below"))
         for name, one in details["parameters"].items()
-        if found.identified and one["value"] is not None
+        if details["identified"] and one["value"] is not None
     }
-    notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
-    return Result(
-        found.identified,
-        known,
-        verdict.word,
-        found.status,
-        verdict.warning,
-        found.advice,
-        notes,
-        details,
-        found,
-        found.model,
-    )
+    head = (details["identified"], known, details["verdict"], details["status"], details["warning"])
+    return Result(*head, tuple(details["advice"]), notes, details, covariance, model, answer, made)
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise PvidError(f"cannot write {path}: {reason(error)}") from error
+
+
+def _refuse_level(level: float) -> None:
+    if not 0 < level < 1:
+        raise PvidError(f"the level of an interval is a probability between 0 and 1, as 0.95, not {level:g}")

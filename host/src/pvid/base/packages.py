@@ -22,6 +22,7 @@ PACKAGES = {
     "mcap_ros1": "mcap-ros1-support",
     "mcap_ros2": "mcap-ros2-support",
     "openpyxl": "openpyxl",
+    "pandas": "pandas",
     "pyarrow": "pyarrow",
     "serial": "pyserial",
     "starlette": "starlette",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,9 @@ _SHOWN = 20  # failures
 @click.option("--shared", metavar="NAME,...", multiple=True, help="With --together: as of identify.")
 @click.option("--no-verify", is_flag=True, help="Do not compute logs again with the twin.")
 @click.option("--page", type=NewFile(), help="Summary page.  [default: OUT with .html]")
+@click.option(
+    "--report", "reports", metavar="FOLDER", type=click.Path(path_type=Path), help="Also write a report of each FILE."
+)
 @click.option("--scheduler", metavar="ADDRESS", help="A running scheduler of dask.distributed (tcp://HOST:PORT).")
 @click.option("--workers", type=click.IntRange(1), help="Processes on this machine.  [default: one a processor]")
 @force_option
@@ -44,6 +48,7 @@ def command(
     shared: tuple[str, ...],
     no_verify: bool,
     page: Path | None,
+    reports: Path | None,
     scheduler: str | None,
     workers: int | None,
     **asked: Any,
@@ -52,7 +57,8 @@ def command(
 
     FILE may be a pattern in quotes: 'runs/*.csv', 'fleet/**/*.pvlog'. A second call with the same -o computes only what
     is new or has changed, also after an interruption. The page shows what failed and how the parameters of each board
-    drift: a board is the USB serial number of a log, or the folder of a run. With --together the FILEs of a folder are
+    drift: a board is the USB serial number of a log, or the folder of a run. With --report it has links to the reports
+    of `identify`. With --together the FILEs of a folder are
     recordings of one mechanism, which are identified together.
 
     Exit code 1: a log is not equal to its twin. 3: nothing was identified.
@@ -71,6 +77,9 @@ def command(
         raise PvidError("--own and --shared are of recordings that are identified --together")
     each, all_ = (tuple(listed_names(one)) for one in (own, shared))
     question = Question(rig=rig, settings=given, verify=not no_verify, own=each, shared=all_, **asked)
+    if reports is not None:
+        reports.mkdir(parents=True, exist_ok=True)
+        question = replace(question, reports=str(reports))
     paths = _files(patterns)
     if not out.name:
         raise PvidError(f"{out}: -o is a Parquet file to write")
@@ -78,7 +87,7 @@ def command(
     refuse_foreign(place)
     with progress_bar("identifying", len(paths)) as advance:
         rows = run(paths, question, Store(out), advance, scheduler=scheduler, workers=workers, together=together)
-    write_whole(place, summary(rows, f"pvid batch {' '.join(patterns)}"))
+    write_whole(place, summary(rows, f"pvid batch {' '.join(patterns)}", place.parent))
     for name, count in counts_of(rows).items():
         click.echo(f"{name}: {count} of {len(rows)}")
     failures = [row for row in rows if row.failure is not None]

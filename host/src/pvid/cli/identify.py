@@ -58,7 +58,10 @@ from pvid.settings.cores import FLOAT
 )
 @click.option("--shared", metavar="NAME,...", multiple=True, help="Offsets of sensors with the same value in all RUNs.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
+@click.option("--report", type=NewFile(), help="Write a report: one HTML page with the answer in words and pictures.")
+@click.option(
+    "--figure", type=FigurePath(), help="Write a figure: measured against predicted, convergence (png, svg, pdf)."
+)
 @force_option
 def command(
     run_paths: tuple[Path, ...],
@@ -78,6 +81,7 @@ def command(
     own: tuple[str, ...],
     shared: tuple[str, ...],
     as_json: bool,
+    report: Path | None,
     figure: Path | None,
 ) -> int:
     """Identifies the parameters of a mechanism from a recorded or simulated RUN, whose columns are t [s] and the
@@ -111,17 +115,20 @@ def command(
     reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both
     stages.
     """
-    from pvid.cli.identify_run import identify_run  # loads SymPy
+    from pvid.cli.identify_run import Pictures, identify_run  # loads SymPy
+    from pvid.identification.summary import Made
     from pvid.log.rig_choice import common_rig
 
     if refine and target is not None and core != FLOAT.name:
         raise PvidError(f"the refinement on a target is in float32: --on {target} --refine --core {FLOAT.name}")
+    rig = common_rig(run_paths, rig_path, settings, model, columns)
+    made = Made.by_this_command(run_paths, rig_path, rig, other)
     return identify_run(
         run_paths,
-        common_rig(run_paths, rig_path, settings, model, columns),
+        rig,
         columns,
         as_json=as_json,
-        figure=figure,
+        pictures=Pictures(figure, report, made, as_json),
         weights=weights or "residuals",
         refine=refine,
         other=other,

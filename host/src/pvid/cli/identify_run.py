@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ from pvid.identification.analysis import analysed, own_of
 from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
+from pvid.identification.summary import Made, summary
 from pvid.log.rig import source_of
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
@@ -69,7 +71,7 @@ def identify_run(
     columns: str | None,
     *,
     as_json: bool,
-    figure: Path | None,
+    pictures: Pictures,
     weights: Weights = "residuals",
     refine: bool | None = None,
     on: str | None = None,
@@ -85,6 +87,7 @@ def identify_run(
     Parameters
     ----------
     paths : of the recordings
+    pictures : what is written beside the text
     weights : of the rows, as in pvid.oracle.weak.identify
     refine : the equations are fitted to the whole run, from the answer on; None: as of pvid.identification.road
     other : another recording, of which is said how well the answer predicts it
@@ -97,9 +100,9 @@ def identify_run(
     if len(paths) > 1:
         _refuse_several(on=on, refine=bool(refine), **only_in_c)
     if only_in_c.get("form") == STRONG_FORM:
-        if figure is not None or refine or weights != "residuals" or add:
+        if pictures.figure is not None or refine or weights != "residuals" or add:
             raise PvidError("--figure, --refine, --weights and --add are for the weak form; omit --form strong")
-        return _identified_by_strong_form(paths[0], rig, columns, as_json=as_json, on=on, **only_in_c)
+        return _identified_by_strong_form(paths[0], rig, columns, pictures, as_json=as_json, on=on, **only_in_c)
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in (("core", "f64"), *IN_C):
             raise PvidError(
@@ -153,10 +156,8 @@ def identify_run(
         with working(f"identifying in {in_c.words}"):
             core = identify_in_c(answer, in_c.name)
     if core is not None and refine:
-        if figure is not None:
-            raise PvidError("--figure is of a refinement in float64; omit --core f32")
         try:
-            return _refined_in_c(core, as_json=as_json, on=on)
+            return _refined_in_c(core, pictures, as_json=as_json, on=on)
         except PvidError as error:  # the answer is that of the first stage
             no_second = {"refinement": {"adopted": False, "text": f"not refined: {error}"}}
             write_stderr(f"pvid: note: not refined: {error}")
@@ -167,8 +168,7 @@ def identify_run(
     done = _told(shown, as_json=as_json, more=entries | ({} if on is None else {"on": on}), lines=lines)
     if core is None and not model.following.is_usual:
         write_stderr("pvid: note: the analysis in float64 takes all windows alike: [identifier] has no effect")
-    if figure is not None:
-        _draw(shown, figure)
+    pictures.write(shown, validation, "" if other is None else other.name)
     return done
 
 
@@ -182,7 +182,7 @@ def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> Non
 
 
 def _identified_by_strong_form(
-    path: Path, rig: MechanismRig, columns: str | None, *, as_json: bool, **given: str | None
+    path: Path, rig: MechanismRig, columns: str | None, pictures: Pictures, *, as_json: bool, **given: str | None
 ) -> int:
     """Identifies a recording by the strong form and prints the answer."""
     from pvid.identification.strong import identify_strong_mechanism
@@ -194,15 +194,42 @@ def _identified_by_strong_form(
     if core in CORES:
         refuse_too_many_unknowns(model)
     answer = identify_strong_mechanism(recording, model, core, LAWS[given.get("law") or "stationary"])
-    return _told(answer, as_json=as_json)
+    done = _told(answer, as_json=as_json)
+    pictures.write(answer)
+    return done
 
 
-def _draw(answer: Analysis | CoreAnswer, figure: Path) -> None:
-    """What was printed, as a figure."""
-    from pvid.show.answer_figure import write_figure  # loads matplotlib
+@dataclass(frozen=True)
+class Pictures:
+    """What is written of an answer beside the text.
 
-    write_figure(answer, figure)
-    click.echo(f"figure: {figure}")
+    Attributes
+    ----------
+    figure, report : files; None: none
+    made : how the answer is made, for the report
+    silent : their names are not printed
+    """
+
+    figure: Path | None = None
+    report: Path | None = None
+    made: Made = Made("")
+    silent: bool = False
+
+    def write(self, answer: Answer, validation: Validation | None = None, name: str = "") -> None:
+        """Writes them and prints their names."""
+        if self.figure is not None:
+            from pvid.show.answer_figure import write_figure  # loads matplotlib
+
+            write_figure(answer, self.figure)
+        if self.report is not None:
+            from pvid.show.log_report import boards_part
+            from pvid.show.report import write_report
+
+            more = boards_part(list(self.made.files))
+            write_report(answer, self.made, self.report, validation=validation, name=name, more=more)
+        for kind, path in (("figure", self.figure), ("report", self.report)):
+            if path is not None and not self.silent:
+                click.echo(f"{kind}: {path}")
 
 
 def plot_run(path: Path, rig: MechanismRig, columns: str | None, figure: Path, *, refine: bool | None) -> None:
@@ -216,16 +243,7 @@ def plot_run(path: Path, rig: MechanismRig, columns: str | None, figure: Path, *
 
     recording, model = recording_of(path, rig, columns, whole=False)
     answer = identified(recording, model, refine=refine)
-    verdict, refinement = answer.found.verdict, answer.refinement
-    text = f"{answer.identifier}; verdict {verdict.word}; chi2 {answer.found.chi2:.2g}"
-    lines = [f"{path.name}: {model.title}", text if answer.identified else f"nothing identified; {text}"]
-    lines += [] if refinement is None else [refinement.text]
-    if answer.prediction:
-        lines.append(f"predicts motion that was not fitted: {listed(answer.prediction)}")
-    if verdict.warning:
-        lines.append(f"warning: {verdict.warning}")
-    lines += [f"advice: {sentence}" for sentence in answer.advice]
-    write_figure(answer, figure, "\n".join(lines))
+    write_figure(answer, figure, f"{path.name}: {summary(answer)}")
 
 
 def _streamed(target: str, rig: MechanismRig, recording: Recording, core: Core, refined: bool) -> bool:
@@ -270,14 +288,15 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     answer, refined, text = refined_answer(analysed(recording, model))
     write_stderr(f"pvid: {text}")
     if figure is not None and refined is not None:
+        from pvid.identification.validation import of_fit
         from pvid.show.answer_figure import write_comparison  # loads matplotlib
 
-        write_comparison(refined, figure)
+        write_comparison(model, of_fit(refined.problem, refined.found), figure)
         click.echo(f"figure: {figure}")
     return answer if answer.identified else None
 
 
-def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
+def _refined_in_c(core: CoreAnswer, pictures: Pictures, *, as_json: bool, on: str | None) -> int:
     """Refines an answer of the first stage by both stages in C and prints the refined estimate, or that of the first
     stage.
 
@@ -290,7 +309,9 @@ def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
 
     with working(f"refining in {FLOAT.words}"):
         found = refined_in_c(core)
-    return _told(found, as_json=as_json, more={} if on is None else {"on": on})
+    done = _told(found, as_json=as_json, more={} if on is None else {"on": on})
+    pictures.write(found)
+    return done
 
 
 def _told(answer: Answer, *, as_json: bool, more: Mapping[str, Any] | None = None, lines: Sequence[str] = ()) -> int:

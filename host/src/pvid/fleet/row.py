@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from pvid.api.identify import identify
+from pvid.api.result import Result
 from pvid.base.errors import PvidError
 from pvid.base.version import __version__
 from pvid.base.wording import reason
@@ -32,6 +33,7 @@ class Question:
     ----------
     verify : whether a log is computed again with the twin, bit for bit
     own, shared : of recordings that are identified together
+    reports : folder of the reports; None: none are written. They are no part of the key
     """
 
     model: str | None = None
@@ -42,6 +44,7 @@ class Question:
     verify: bool = True
     own: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
+    reports: str | None = field(default=None, repr=False)
 
     def key(self, *paths: Path) -> str:
         """Sixteen digits that change with the content of the recordings, the rig files beside them, the question or the
@@ -81,6 +84,7 @@ class Row:
     took : seconds of work
     predicted : R^2 of the worst predicted sensor, of motion that was not fitted; None: it was not looked at
     se_apart : name -> standard error without the part of scale, which recordings of one rig have in common
+    report : its report; None: none was asked for
     """
 
     key: str
@@ -98,6 +102,7 @@ class Row:
     took: float = 0.0
     predicted: float | None = None
     se_apart: Mapping[str, float] = field(default_factory=dict)
+    report: str | None = None
 
 
 def row_of(given: str | tuple[str, ...], question: Question) -> Row:
@@ -124,6 +129,7 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
             own=question.own if len(places) > 1 else (),
             shared=question.shared if len(places) > 1 else (),
         )
+        report = None if question.reports is None else _reported(result, question.reports, Path(path), key)
     except (PvidError, OSError) as error:
         return Row(key, path, board, began, failure=_told(error), took=time.monotonic() - start)
     return Row(
@@ -141,7 +147,13 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
         took=time.monotonic() - start,
         predicted=min((one["r2"] for one in result.details.get("prediction", {}).values()), default=None),
         se_apart={name: result.se_apart(name) for name in result.parameters},
+        report=report,
     )
+
+
+def _reported(result: Result, folder: str, path: Path, key: str) -> str:
+    """Writes the report of a recording, under its name and a part of its key."""
+    return str(result.report(Path(folder) / f"{path.stem}-{key[:8]}.html"))
 
 
 def _told(error: OSError | PvidError) -> str:

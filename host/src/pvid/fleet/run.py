@@ -43,7 +43,7 @@ def run(
     rows: dict[str | tuple[str, ...], Row] = {}
     for place in places if store.rows else ():  # else nothing is kept, and workers read the files anyway
         kept = store.rows.get(_key(place, question))
-        if kept is not None:
+        if kept is not None and (question.reports is None or (kept.report and Path(kept.report).is_file())):
             rows[place] = kept
     progress(len(rows))
     missing = [place for place in places if place not in rows]

@@ -122,7 +122,7 @@ def read_rows(path: Path) -> list[Row]:
         table = parquet.read_table(path)
     except Exception as error:  # pyarrow's own kinds, which cannot be named without importing it
         raise PvidError(f"{path}: exists and is not a Parquet file: choose another name for -o") from error
-    if not set(_FIXED) - {"predicted"} <= set(table.column_names):  # which files of version 0.1 do not have
+    if not set(_FIXED) - {"predicted", "report"} <= set(table.column_names):  # which older files do not have
         raise PvidError(f"{path}: exists and was not written by pvid batch: choose another name for -o")
     names = [name for name in table.column_names if name not in _FIXED and name + _SE in table.column_names]
     units = {name: (table.schema.field(name).metadata or {}).get(b"unit", b"").decode() for name in names}

@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-import io
+import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from html import escape
+from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from pvid.base.replacing import CREATOR
 from pvid.base.rounding import with_error
 from pvid.fleet.row import EQUAL, Row
+from pvid.show.document import document, picture, table, text
 
 _DAY = 86400.0
 _DRIFTS = 4.0  # standard errors of the slope
 _MOST_BOARDS = 10  # with a colour of their own
-_STYLE = """
-:root { color-scheme: light dark; font: 15px/1.45 system-ui, sans-serif; }
-body { max-width: 70rem; margin: 2rem auto; padding: 0 1rem; }
-table { border-collapse: collapse; margin: 1rem 0; }
-td, th { padding: .2rem .8rem; text-align: right; border-bottom: 1px solid #8884; }
-td:first-child, th:first-child, td.words { text-align: left; }
-.alarm { color: #c22; font-weight: 600; }
-figure { margin: 1rem 0; background: #fff; }
-svg { width: 100%; height: auto; }
-"""
 
 
 @dataclass(frozen=True)
@@ -93,46 +85,60 @@ def counts_of(rows: Sequence[Row]) -> Mapping[str, int]:
     return {name: count for name, count in found.items() if count}
 
 
-def page(rows: Sequence[Row], title: str) -> str:
-    """A document of HTML without anything from elsewhere."""
+def page(rows: Sequence[Row], title: str, folder: Path | None = None) -> str:
+    """A document of HTML without anything from elsewhere.
+
+    Parameters
+    ----------
+    folder : in which it will be, for links to reports
+    """
     drifts = drifts_of(rows)
-    counts = "".join(f"<tr><td>{escape(name)}</td><td>{count}</td></tr>" for name, count in counts_of(rows).items())
+    counts = table((), ([text(name), str(count)] for name, count in counts_of(rows).items()))
     parts = [
-        f"<h1>{escape(title)}</h1><p>{len(rows)} recordings of {len({row.board for row in rows})} boards</p>",
-        f"<table>{counts}</table>",
+        f"<h1>{text(title)}</h1><p>{len(rows)} recordings of {len({row.board for row in rows})} boards</p>",
+        counts,
         "<h2>Parameters</h2>",
         "<p>Mean over a board's recordings without a warning, and the change in a day. A change beyond "
         f"{_DRIFTS:g} standard errors is marked. Scatter is the variance about the line over that of the standard "
         "errors: 1 is expected.</p>",
         _drift_table(drifts),
-        f"<figure>{_figure(rows)}</figure>" if drifts else "",
+        _figure(rows) if drifts else "",
         "<h2>Recordings without a good answer</h2>",
         _trouble(rows),
+        *_reports(rows, folder or Path()),
     ]
-    head = (
-        f'<meta charset="utf-8"><meta name="generator" content="{CREATOR}">'
-        f'<meta name="viewport" content="width=device-width"><title>{escape(title)}</title>'
-    )
-    body = "".join(parts)
-    return f'<!doctype html><html lang="en"><head>{head}<style>{_STYLE}</style></head><body>{body}</body></html>\n'
+    return document(title, "".join(parts))
 
 
 def _drift_table(drifts: Sequence[Drift]) -> str:
     heads = ("board", "parameter", "recordings", "mean", "s.e.", "change a day", "s.e.", "scatter")
-    lines = ["<tr>" + "".join(f"<th>{one}</th>" for one in heads) + "</tr>"]
+    rows = []
     for one in drifts:
         change = ("-", "-") if one.slope is None or not one.slope_se else with_error(one.slope, one.slope_se)
         cells = [
-            escape(one.board),
-            escape(f"{one.name} [{one.unit}]" if one.unit else one.name),
+            text(one.board),
+            text(f"{one.name} [{one.unit}]" if one.unit else one.name),
             str(one.recordings),
             *with_error(one.mean, one.se),
             *change,
             "-" if one.scatter is None else f"{one.scatter:.2g}",
         ]
-        mark = ' class="alarm"' if one.drifts else ""
-        lines.append(f"<tr{mark}>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
-    return f"<table>{''.join(lines)}</table>"
+        rows.append([f'<strong class="bad">{cell}</strong>' for cell in cells] if one.drifts else cells)
+    return table(heads, rows, numbers=5)
+
+
+def _reports(rows: Sequence[Row], folder: Path) -> Iterator[str]:
+    """Links to them, if there are any."""
+    found = [
+        [
+            f'<a href="{quote(os.fsencode(os.path.relpath(row.report, folder)))}">{text(row.path)}</a>',
+            text(row.verdict or ""),
+        ]
+        for row in rows
+        if row.report is not None
+    ]
+    if found:
+        yield "<h2>Reports</h2>" + table(("recording", "verdict"), found)
 
 
 def _trouble(rows: Sequence[Row]) -> str:
@@ -142,18 +148,21 @@ def _trouble(rows: Sequence[Row]) -> str:
         if row.verified not in (None, EQUAL):
             words = f"{words + '; ' if words else ''}{row.verified}"
         if words:
-            lines.append(f'<tr><td>{escape(row.path)}</td><td class="words">{escape(words)}</td></tr>')
-    return f"<table>{''.join(lines)}</table>" if lines else "<p>None.</p>"
+            lines.append([text(row.path), text(words)])
+    return table(("recording", "why"), lines) if lines else "<p>None.</p>"
 
 
 def _figure(rows: Sequence[Row]) -> str:
     """A panel for each parameter: value and standard error over the date, a colour for each board."""
-    from matplotlib.figure import Figure
-
     good = [row for row in rows if row.parameters and row.warning is None]
     names = list(dict.fromkeys((name, one[2]) for row in good for name, one in row.parameters.items()))
+    return picture(
+        lambda figure: _drawn(figure, good, names), 0.9 + 1.7 * len(names), "Value and standard error.", "fleet"
+    )
+
+
+def _drawn(figure: Figure, good: Sequence[Row], names: Sequence[tuple[str, str]]) -> None:
     boards = list(dict.fromkeys(row.board for row in good))
-    figure = Figure(figsize=(10, 2.2 * len(names)), layout="constrained")
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for panel, (name, unit) in zip(panels, names, strict=True):
         for number, board in enumerate(boards):
@@ -175,7 +184,3 @@ def _figure(rows: Sequence[Row]) -> str:
     panels[-1].tick_params(axis="x", rotation=20)
     if 1 < len(boards) <= _MOST_BOARDS:
         panels[0].legend(fontsize="small", ncols=min(4, len(boards)), loc="lower left", bbox_to_anchor=(0, 1))
-    drawn = io.StringIO()
-    figure.savefig(drawn, format="svg", metadata={"Date": None})
-    text = drawn.getvalue()
-    return text[text.index("<svg") :]

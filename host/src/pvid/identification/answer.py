@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -24,10 +25,32 @@ from pvid.rig.run import Recording
 
 if TYPE_CHECKING:
     from pvid.identification.refinement.fit import Problem, Refined
+    from pvid.identification.validation import Validation
 
 Float = npt.NDArray[np.float64]
 
 _NOISE = 2.0  # chi^2 over the sensors' noise up to which it explains the residuals
+
+
+LEVEL = 0.95  # of the intervals that are shown
+
+
+def interval_of(value: float, se: float, below: float | None, level: float = LEVEL) -> tuple[float, float]:
+    """In which a parameter is with this probability, from 0 to 1; what may be 0 is positive, and at most `below`."""
+    reach = NormalDist().inv_cdf((1 + level) / 2) * se
+    low, high = value - reach, value + reach
+    return (low, high) if below is None else (max(low, 0.0), max(high, below))
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """What moves a value, for what it has in common with others: by one standard deviation of each independent part of
+    the noise; of each gain, constant and clock; and by each term that the equations may lack.
+    """
+
+    noise: Float
+    scale: Float
+    model: Float
 
 
 @dataclass(frozen=True)
@@ -43,6 +66,7 @@ class Value:
     status, reason : whether the run determines it; a clause where it does not, or where it may be 0
     below : it is below this with 95 %, where it may be 0
     word : what it may be used for
+    factors : what noise, scale and what is missing move it by; None: alone
     """
 
     unit: str
@@ -55,10 +79,19 @@ class Value:
     se_model: float | None = None
     se_scale: float | None = None
     word: Word = "good"
+    factors: Factors | None = field(default=None, repr=False, compare=False)
+
+    def interval(self, level: float = LEVEL) -> tuple[float, float] | None:
+        """In which it is with this probability; None: it is not identified."""
+        if self.value is None or self.se is None:
+            return None
+        return interval_of(self.value, self.se, self.below, level)
 
     def as_json(self) -> dict[str, Any]:
         """Its entry in the object of `identify --json`."""
-        out = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise}
+        interval = self.interval()
+        out: dict[str, Any] = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise}
+        out |= {"interval": None if interval is None else list(interval)}
         out |= {"se_scale": self.se_scale, "se_model": self.se_model, "verdict": self.word, "status": self.status}
         out |= {} if self.reason is None else {"reason": self.reason}
         return out | ({} if self.below is None else {"below": self.below})
@@ -106,6 +139,31 @@ class Answer(ABC):
         return self.verdict.status
 
     @property
+    def unseen(self) -> Validation | None:
+        """How its equations predict motion that was not fitted: in the halves of the recording, each of them with what
+        the other gives. None: they were not simulated."""
+        return None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the values that are identified."""
+        return tuple(name for name, one in self.values.items() if one.value is not None and self.identified)
+
+    @property
+    def covariance_of_values(self) -> Float:
+        """Of the identified values, in the order of `names` [n, n]: its diagonal is their squared standard errors.
+
+        Noise and scale are those of independent causes. The part of the model is as large as for the term that moves a
+        value most, and correlated as over all terms.
+        """
+        known = [self.values[name] for name in self.names]
+        out = np.diag([(one.se or 0.0) ** 2 for one in known])
+        for k, one in enumerate(known):
+            for j, other in enumerate(known[:k]):
+                out[j, k] = out[k, j] = _common(one, other)
+        return out
+
+    @property
     def doubts(self) -> Sequence[Reason]:
         """The reasons that are printed below the values."""
         return self.verdict.reasons
@@ -130,6 +188,16 @@ class Answer(ABC):
             "samples": len(self.recording),
             "model": self.model.name,
         }
+
+
+def _common(one: Value, other: Value) -> float:
+    """Covariance of two values."""
+    a, b = one.factors, other.factors
+    if a is None or b is None:
+        return 0.0
+    sizes = float(np.linalg.norm(a.model) * np.linalg.norm(b.model))
+    by_model = float(a.model @ b.model) / sizes * (one.se_model or 0.0) * (other.se_model or 0.0) if sizes else 0.0
+    return float(a.noise @ b.noise + a.scale @ b.scale) + by_model
 
 
 class RefinedFit(Protocol):
@@ -183,7 +251,7 @@ class Analysis(Answer):
     recording : the samples
     weights : of the rows
     advice : sentences with what to type, where a column seems to be wrong
-    prediction : how well each sensor's motion is predicted that was not fitted; none: it was not looked at
+    unseen : how motion is predicted that was not fitted; None: it was not looked at
     predicted : the same in each of several recordings, by name
     refinement : None: none was tried
     """
@@ -194,9 +262,14 @@ class Analysis(Answer):
     recording: Recording
     weights: Weights = "residuals"
     advice: tuple[str, ...] = ()
-    prediction: tuple[SensorPrediction, ...] = ()
+    unseen: Validation | None = None
     predicted: Mapping[str, tuple[SensorPrediction, ...]] = field(default_factory=dict)
     refinement: Refinement | None = None
+
+    @property
+    def prediction(self) -> tuple[SensorPrediction, ...]:
+        """How well each sensor's motion is predicted that was not fitted."""
+        return () if self.unseen is None else self.unseen.sensors
 
     @property
     def identified(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.record import Record
+
+if TYPE_CHECKING:
+    from pvid.identification.validation import Validation
 
 # Reasons of ticks that end no window.
 _WITHIN = (Outcome.WARMING_UP, Outcome.ACCUMULATED, Outcome.REJECTED_NOT_FINITE, Outcome.REJECTED_SATURATED)
@@ -99,6 +102,11 @@ class CoreAnswer(Answer):
             (float(t), values_of(model, p, correlation * np.outer(se, se), none, judged, verdict, of_known=False))
             for t, p, se in zip(own.t, own.p, own.se, strict=True)
         ]
+
+    @property
+    def unseen(self) -> Validation | None:
+        """That of the analysis."""
+        return self.analysis.unseen
 
     @property
     def verdict(self) -> Verdict:

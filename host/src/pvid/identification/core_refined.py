@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,9 @@ from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig
 from pvid.twin.printed import PrintedTwin
+
+if TYPE_CHECKING:
+    from pvid.identification.validation import Validation
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +118,11 @@ class RefinedCoreAnswer(Answer):
             )
             out.append((float(answer.recording.t[tick]), values))
         return out
+
+    @property
+    def unseen(self) -> Validation | None:
+        """That of the analysis."""
+        return self.weak.unseen
 
     @property
     def identified(self) -> bool:

@@ -24,7 +24,7 @@ from pvid.identification.answer import Analysis, RefinedFit
 from pvid.identification.refinement.fit import Problem, Refined, Stretch, refined
 from pvid.identification.refinement.problem import prior_about
 from pvid.identification.sensor_prediction import SensorPrediction
-from pvid.identification.validation import Motion
+from pvid.identification.validation import Motion, Validation
 from pvid.identification.values import values_of_found
 from pvid.oracle.weak import verdict, work
 from pvid.oracle.weak.design import WeakDesign
@@ -81,7 +81,7 @@ class Candidate:
     p, se : from all data [n_p]
     halves : r from each half of the parts [2][parameters and settings of the simulation]
     fit : of the weak form; of the refinement the estimate at which it began
-    sensors : how well the halves predict each other
+    unseen : how well the halves predict each other; None: not scored
     of_recordings : the same in each of several recordings, by name
     """
 
@@ -90,9 +90,14 @@ class Candidate:
     se: Float
     halves: tuple[Float, Float]
     fit: Fit
-    sensors: tuple[SensorPrediction, ...] = ()
+    unseen: Validation | None = None
     of_recordings: Mapping[str, tuple[SensorPrediction, ...]] = field(default_factory=dict)
     score: float = np.inf
+
+    @property
+    def sensors(self) -> tuple[SensorPrediction, ...]:
+        """Of each sensor."""
+        return () if self.unseen is None else self.unseen.sensors
 
 
 def judged(answer: Analysis) -> Analysis:
@@ -128,7 +133,7 @@ def with_prediction(answer: Analysis) -> Analysis:
                 answer = _with_superfluous(answer, [answer.model.p_names[k] for k in small])
     except FAILURES:  # they cannot be simulated on this run
         return answer
-    return with_sensors(answer, usual[0].sensors) if usual else answer
+    return with_unseen(answer, usual[0].unseen) if usual else answer
 
 
 def _with_superfluous(answer: Analysis, names: Sequence[str]) -> Analysis:
@@ -142,10 +147,10 @@ def _with_superfluous(answer: Analysis, names: Sequence[str]) -> Analysis:
     return replace(answer, found=replace(answer.found, verdict=Verdict(reasons)))
 
 
-def with_sensors(answer: Analysis, sensors: tuple[SensorPrediction, ...]) -> Analysis:
+def with_unseen(answer: Analysis, unseen: Validation | None) -> Analysis:
     """The answer with these predictions, and a doubt where one is poor and more than noise."""
-    answer = replace(answer, prediction=sensors)
-    poor = [one for one in sensors if one.r2 < PREDICTED and not (one.of_noise or np.inf) < _OF_NOISE]
+    answer = replace(answer, unseen=unseen)
+    poor = [one for one in answer.prediction if one.r2 < PREDICTED and not (one.of_noise or np.inf) < _OF_NOISE]
     if not poor or not answer.identified:
         return answer
     reasons = [*answer.found.verdict.reasons, _unpredicted(poor, "it explains what was fitted alone")]
@@ -269,7 +274,7 @@ class _Trial:
     def _scored(self, one: Candidate) -> Candidate:
         """With how well each half predicts the other."""
         motion, samples = self._motion, self._block
-        measured, simulated, firsts = [], [], []
+        measured, simulated, places = [], [], []
         for r, others in zip(one.halves, reversed(self._parts), strict=True):
             problem = motion.within(others)
             if not problem.measured.stretches or problem.longest < samples:
@@ -277,22 +282,22 @@ class _Trial:
             cut, z = motion.simulated(r, problem, samples, _SAMPLES)
             measured.append(cut.rows(problem.measured.z))
             simulated.append(z)
-            firsts.append(cut.first)
+            places.append(cut.places)
         shortest = min(part.shape[1] for part in measured)
-        z, x = (np.concatenate([part[:, :shortest] for part in both]) for both in (measured, simulated))
+        z, x, at = (np.concatenate([part[:, :shortest] for part in both]) for both in (measured, simulated, places))
         if not np.isfinite(x).all():
             return one
-        sensors = motion.compared(z, x)
-        rms = np.array([one.rms for one in sensors])
-        first = np.concatenate(firsts)
+        at *= self._every
+        unseen = motion.validation(self._answer.recording.t[at], z, x)
+        rms = np.array([one.rms for one in unseen.sensors])
+        first = at[:, 0]
         of_recordings = {
             own.name: motion.compared(z[inside], x[inside])
             for own in self._answer.recording.origins
-            if (inside := (own.first <= self._every * first) & (self._every * first < own.end)).any()
+            if (inside := (own.first <= first) & (first < own.end)).any()
         }
-        return replace(
-            one, sensors=sensors, of_recordings=of_recordings, score=float(np.mean(np.log(np.maximum(rms, motion.sd))))
-        )
+        score = float(np.mean(np.log(np.maximum(rms, motion.sd))))
+        return replace(one, unseen=unseen, of_recordings=of_recordings, score=score)
 
     def is_as_good_without(self, one: Candidate, small: Sequence[int]) -> bool:
         """Whether motion is predicted as well with nothing of these positive parameters [places in p]."""
@@ -413,7 +418,7 @@ def _published(answer: Analysis, chosen: Candidate, usual: Candidate | None, ali
         answer,
         found=judged_found,
         values=values_of_found(model, judged_found),
-        prediction=chosen.sensors,
+        unseen=chosen.unseen,
         predicted=chosen.of_recordings,
     )
 

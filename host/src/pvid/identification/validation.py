@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
-from pvid.identification.refinement.fit import Cut, Prior, Problem, Stretch, refined
+from pvid.identification.refinement.fit import Cut, Prior, Problem, Refined, Stretch, refined
 from pvid.identification.refinement.problem import prior_about, problem_of
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.compiled import CompiledModel
@@ -37,7 +37,7 @@ class Validation:
     ----------
     sensors : how well each is predicted
     block_s, blocks : length [s] and number of the blocks
-    t, measured, simulated : of the samples in them [n]; by sensor [n] each
+    t, measured, simulated : of the samples in them [n], block after block; by sensor [n] each
     fitted : by name: parameters of which the recording has its own values, fitted to it beside the starts
     """
 
@@ -150,6 +150,22 @@ class Motion:
             for k, name in enumerate(names)
         )
 
+    def validation(self, t: Float, measured: Float, simulated: Float) -> Validation:
+        """Of readings in blocks [blocks, samples, sensors] at the times t [blocks, samples] in s; the blocks are put in
+        the order of their times."""
+        order = np.argsort(t[:, 0], kind="stable")
+        t, measured, simulated = t[order], measured[order], simulated[order]
+        names = self.problem.kernel.made.outputs
+        blocks, samples = t.shape
+        return Validation(
+            self.compared(measured, simulated),
+            samples / self.problem.measured.rate,
+            blocks,
+            t.ravel(),
+            {name: measured[..., k].ravel() for k, name in enumerate(names)},
+            {name: simulated[..., k].ravel() for k, name in enumerate(names)},
+        )
+
 
 def validated(
     model: CompiledModel, recording: Recording, p: Float, window_s: float, own: Collection[str] = ()
@@ -182,17 +198,15 @@ def validated(
         raise PvidError(
             f"the motion of {model.name} runs away with these parameters: they are not those of this recording"
         )
-    names = problem.kernel.made.outputs
-    places = cut.first[:, None] + np.arange(cut.samples)
-    return Validation(
-        motion.compared(measured, simulated),
-        cut.samples / rate,
-        len(cut.first),
-        recording.t[places.ravel()],
-        {name: measured[..., k].ravel() for k, name in enumerate(names)},
-        {name: simulated[..., k].ravel() for k, name in enumerate(names)},
-        {one.name: float(r[k]) for k, one in enumerate(problem.kernel.made.parameters) if one.name in own},
-    )
+    fitted = {one.name: float(r[k]) for k, one in enumerate(problem.kernel.made.parameters) if one.name in own}
+    return replace(motion.validation(recording.t[cut.places], measured, simulated), fitted=fitted)
+
+
+def of_fit(problem: Problem, found: Refined) -> Validation:
+    """What a refinement fits, over its blocks; times are those since the recording began."""
+    measured = found.cut.rows(problem.measured.z)
+    simulated = problem.simulated(found.r, found.cut, found.starts).reshape(measured.shape)
+    return Motion(problem, found.r).validation(found.cut.places / problem.measured.rate, measured, simulated)
 
 
 def simulation_of(model: CompiledModel, recording: Recording, p: Float) -> dict[str, Float]:

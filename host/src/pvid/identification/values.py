@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.identification.answer import Value
+from pvid.identification.answer import Factors, Value
 from pvid.model.compiled import CompiledModel, Output
 from pvid.model.evaluation import with_slopes
 from pvid.oracle.weak.identify import Identified
@@ -61,6 +61,7 @@ def values_of(
     of_known : the first of the gains are those of constants, in which an output may stand by itself
     """
     terms = np.zeros((0, len(p))) if shifts is None else shifts
+    root = _root(covariance)
 
     def shown(unit: str, value: float, slope: Float, of: Judged, word: Word, direct: Float | float = 0.0) -> Value:
         if of.status == "not_identified":
@@ -68,7 +69,8 @@ def values_of(
         se_noise, se_scale = float(np.sqrt(slope @ covariance @ slope)), float(np.linalg.norm(gains @ slope + direct))
         se_model = float(np.max(np.abs(terms @ slope), initial=0.0))
         se = math.hypot(se_noise, se_scale, se_model)
-        return Value(unit, value, se, se_noise, of.status, of.reason, of.below, se_model, se_scale, word)
+        factors = Factors(root @ slope, gains @ slope + direct, terms @ slope)
+        return Value(unit, value, se, se_noise, of.status, of.reason, of.below, se_model, se_scale, word, factors)
 
     values = {}
     for one in model.outputs:
@@ -89,6 +91,14 @@ def values_of(
     for k, unknown in enumerate(model.unknowns):
         values[unknown.name] = shown(unknown.unit, float(p[k]), np.eye(len(p))[k], judged[k], verdict.of(unknown.name))
     return values
+
+
+def _root(covariance: Float) -> Float:
+    """A matrix whose square is a covariance [n_p, n_p]; 0 where it has numbers that are none."""
+    if not np.isfinite(covariance).all():
+        return np.zeros_like(covariance)
+    squares, directions = np.linalg.eigh(covariance)
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0))[:, np.newaxis] * directions.T)
 
 
 def unless_held(judged: Sequence[Judged], reason: str | None) -> Sequence[Judged]:

@@ -3,6 +3,7 @@ names a mechanism, the one whose signals the recording has."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -12,9 +13,10 @@ from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
 from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log, named_in
+from pvid.model.description import Model
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import described as description_of
-from pvid.models.registry import asked_for, is_named, names, shipped
+from pvid.models.registry import Mechanism, asked_for, is_named, names, shipped
 from pvid.rig.columns import Columns, MissingColumnError, parsed
 from pvid.rig.former import translated
 from pvid.rig.mechanism_file import MechanismRig, channels_of, parsed_file, rig_path_of, with_settings
@@ -25,7 +27,7 @@ def rig_of(
     run_path: Path | None,
     rig_path: Path | None = None,
     settings: Sequence[str] = (),
-    model: str | None = None,
+    model: str | os.PathLike[str] | Model | None = None,
     columns: str | None = None,
     read: Callable[[Columns], object] | None = None,
 ) -> MechanismRig:
@@ -35,7 +37,7 @@ def rig_of(
     ----------
     run_path, rig_path : a log has its own rig, a run may have a rig file beside it; the other one comes before both
     settings : `KEY=VALUE`, which come before the file; the name of a constant of the mechanism alone is a key as well
-    model : name or model file of this call, before both
+    model : name, model file or model of this call, before both
     columns : the text of --columns
     read : reads the recording, where it is no file
 
@@ -69,7 +71,7 @@ def common_rig(
     run_paths: Sequence[Path],
     rig_path: Path | None = None,
     settings: Sequence[str] = (),
-    model: str | None = None,
+    model: str | os.PathLike[str] | Model | None = None,
     columns: str | None = None,
 ) -> MechanismRig:
     """The rig of recordings of one mechanism; see `rig_of`.
@@ -88,7 +90,7 @@ def common_rig(
     return rig
 
 
-def _document(run_path: Path | None, rig_path: Path | None, asked: str | Path | None) -> Mapping[str, Any]:
+def _document(run_path: Path | None, rig_path: Path | None, asked: Mechanism | None) -> Mapping[str, Any]:
     """The tables of the file that a rig is in; none: it is in none."""
     if rig_path is None and run_path is not None and is_run(run_path) and rig_path_of(run_path).is_file():
         rig_path = rig_path_of(run_path)

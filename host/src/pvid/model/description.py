@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from html import escape
 from typing import Any, Literal
 
 import sympy as sp
@@ -14,6 +15,7 @@ from pvid.model.compiled import CompiledModel, Extra, Known, Output, Refinement,
 from pvid.model.compiler import rows_of
 from pvid.model.eliminate import Equation
 from pvid.model.normal_form import rational
+from pvid.model.readable import latex
 from pvid.model.refusal import ModelError, place_of_caller
 from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
 from pvid.model.typed import typed_expression
@@ -49,6 +51,21 @@ class Model:
         self._extras: list[Extra] = []
         self._shapes: dict[sp.Symbol, sp.Expr] = {}
         self._refinement = Refinement()
+
+    # ---- in a notebook
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {latex(one.expression for one in self.equations)}$" if self.equations else ""
+
+    def _repr_html_(self) -> str:
+        kinds: dict[str, Sequence[Signal | Unknown | Known | Output]]
+        kinds = {"signal": self.signals, "unknown": self.unknowns, "known": self.knowns, "output": self.outputs}
+        rows = "".join(
+            f"<tr><td>{escape(one.name)}</td><td>{escape(one.unit)}</td><td>{kind}</td></tr>"
+            for kind, ones in kinds.items()
+            for one in ones
+        )
+        return f"<p><strong>{escape(self.title)}</strong></p><p>{self._repr_latex_()}</p><table>{rows}</table>"
 
     # ---- quantities
 

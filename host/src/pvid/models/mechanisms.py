@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from pvid import model as language
 from pvid.base.errors import PvidError
@@ -19,28 +20,31 @@ from pvid.base.wording import printable
 from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
 from pvid.model.refusal import ModelError, Place
-from pvid.models.registry import DESCRIPTION, shipped
+from pvid.models.registry import DESCRIPTION, Mechanism, shipped
 from pvid.models.registry import names as names
 
 _FOLDER = Path(__file__).parent
+_models: WeakKeyDictionary[Model, tuple[str, CompiledModel]] = WeakKeyDictionary()
 
 
-def path_of(mechanism: str | Path) -> tuple[str, Path]:
+def path_of(mechanism: Mechanism) -> tuple[str, Path]:
     """A mechanism's name and file.
 
     Raises
     ------
     PvidError
-        Where there is no shipped mechanism of the name, or no such model file.
+        Where there is no shipped mechanism of the name, no such model file, or the mechanism is a model.
     """
     if isinstance(mechanism, str):
         return shipped(mechanism), _FOLDER / mechanism / DESCRIPTION
+    if isinstance(mechanism, Model):
+        raise PvidError(f"the model {mechanism.title} is in no file: write it to one")
     if mechanism.suffix == ".py" and mechanism.is_file():
         return mechanism.parent.name if mechanism.name == DESCRIPTION else mechanism.stem, mechanism
     raise PvidError(f"{printable(str(mechanism))}: no such model; give a .py file or one of {', '.join(names())}")
 
 
-def described(mechanism: str | Path) -> Model:
+def described(mechanism: Mechanism) -> Model:
     """The description in a model file, which may import Python files that lie beside it.
 
     Raises
@@ -52,7 +56,7 @@ def described(mechanism: str | Path) -> Model:
     return _left_in(_space_of(path), path)[1]
 
 
-def text_with(mechanism: str | Path, lines: Sequence[str]) -> str:
+def text_with(mechanism: Mechanism, lines: Sequence[str]) -> str:
     """A model file's text with more calls of its model, each as in "add('a*sgn(v)')".
 
     Raises
@@ -127,8 +131,13 @@ def _line(error: BaseException, path: Path) -> int:
     return (lines[-1] or 0) if lines else 0
 
 
-def compiled_of(mechanism: str | Path) -> CompiledModel:
-    """A shipped mechanism by its name, or a model file by its path, compiled; kept while the file does not change."""
+def compiled_of(mechanism: Mechanism) -> CompiledModel:
+    """A shipped mechanism by its name, a model file by its path, or a model, compiled; kept until it changes."""
+    if isinstance(mechanism, Model):
+        state = repr(vars(mechanism))
+        if _models.get(mechanism, ("",))[0] != state:
+            _models[mechanism] = state, mechanism.compiled()
+        return _models[mechanism][1]
     name, path = path_of(mechanism)
     return _compiled(name, path, path.stat().st_mtime_ns)
 

@@ -1,6 +1,7 @@
 """The shipped mechanisms, and what a call names beside them.
 
-A mechanism is a `str`, the name of a shipped one, or a `Path`, a model file, which is Python and runs. Texts (a rig
+A mechanism is a `str`, the name of a shipped one, a `Path`, a model file, which is Python and runs, or a `Model` of the
+program that calls. Texts (a rig
 file, a log) contain `str` alone; `asked_for` alone makes a `Path`, of what the user of this call named himself.
 """
 
@@ -8,9 +9,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path, PureWindowsPath
+from typing import TYPE_CHECKING, TypeAlias
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import printable
+
+if TYPE_CHECKING:  # it loads SymPy
+    from pvid.model.description import Model
+
+Mechanism: TypeAlias = "str | Path | Model"
 
 DESCRIPTION = "mechanism.py"  # of a shipped mechanism, in its folder
 _FOLDER = Path(__file__).parent
@@ -21,14 +28,18 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in _FOLDER.glob(f"*/{DESCRIPTION}")))
 
 
-def asked_for(model: str | os.PathLike[str]) -> str | Path:
-    """The mechanism that `--model` of this call, or the argument `model` of a function, names."""
-    return str(model) if str(model) in names() else Path(model)
+def asked_for(model: str | os.PathLike[str] | Model) -> Mechanism:
+    """The mechanism that `--model` of this call, or the argument `model` of a function, names or is."""
+    if isinstance(model, str | os.PathLike):
+        return str(model) if str(model) in names() else Path(model)
+    return model
 
 
-def is_named(asked: str | Path, name: str) -> bool:
+def is_named(asked: Mechanism, name: str) -> bool:
     """Whether the text of a log names the mechanism of this call; of a model file it has the name without the folder,
-    but older versions wrote the path."""
+    but older versions wrote the path. A model may be that of any file."""
+    if not isinstance(asked, str | Path):
+        return name.endswith(".py")
     return asked == name if isinstance(asked, str) else PureWindowsPath(name).name == asked.name
 
 

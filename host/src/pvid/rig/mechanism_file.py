@@ -41,6 +41,7 @@ from pvid.rig.columns import Channel
 if TYPE_CHECKING:  # it loads SymPy
     from pvid.model.compiled import CompiledModel, Unknown
     from pvid.model.description import Model as Description
+    from pvid.models.registry import Mechanism
 
 _Read = TypeVar("_Read")
 
@@ -57,7 +58,9 @@ class MechanismRig:
 
     Attributes
     ----------
-    model : name of a shipped mechanism, or the path of a model file that this call named (pvid.models.registry)
+    model
+        name of a shipped mechanism, or the path of a model file or the model that this call named
+        (pvid.models.registry)
     sample_rate : [Hz]; None: that of the run
     known, known_sd : values of the model's constants, and standard deviations of them
     sensor : by signal: resolution, reach [its unit], noise [resolutions], gain_sd [relative], delay [s], neglected (see
@@ -68,7 +71,7 @@ class MechanismRig:
     clock_sd : relative standard deviation of the sample rate; None: the model's
     """
 
-    model: str | Path
+    model: Mechanism
     sample_rate: float | None = None
     known: Mapping[str, float] = field(default_factory=dict)
     sensor: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -90,13 +93,13 @@ class MechanismRig:
         return cls.of_document(toml_document(text))
 
     @classmethod
-    def of_document(cls, document: Mapping[str, Any], asked: str | Path | None = None) -> MechanismRig:
+    def of_document(cls, document: Mapping[str, Any], asked: Mechanism | None = None) -> MechanismRig:
         """From the tables of a text; see `parse`. `asked`: the mechanism of this call, in place of the text's."""
         for key in document:
             if key not in _KEYS:
                 raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(_KEYS)} are")
         model = _table(document, "model").get("name") if asked is None else asked
-        if not isinstance(model, str | Path):
+        if model is None or (asked is None and not isinstance(model, str)):
             raise PvidError('the mechanism is missing: [model] name = "dc_motor", or the path of a model file')
         top = _numbers({key: document[key] for key in ("sample_rate", "clock_sd") if key in document}, "")
         sensors = _table(document, "sensor")
@@ -115,7 +118,7 @@ class MechanismRig:
         """TOML text; `parse` gives the same rig back."""
         lines = [] if self.sample_rate is None else [f"sample_rate = {self.sample_rate!r}  # Hz"]
         lines += [] if self.clock_sd is None else [f"clock_sd = {self.clock_sd!r}"]
-        name = self.model.name if isinstance(self.model, Path) else self.model
+        name = self.model if isinstance(self.model, str) else getattr(self.model, "name", self.compiled().name)
         lines += ["", "[model]", f"name = {quoted(name)}"]
         tables: dict[str, Mapping[str, float]] = {"known": self.known, "known_sd": self.known_sd}
         tables |= {f"sensor.{name}": keys for name, keys in self.sensor.items()}
@@ -165,7 +168,7 @@ class MechanismRig:
         signals = []
         for signal in model.signals:
             given: dict[str, Any] = dict(self.sensor.get(signal.name, {}))
-            stated = "resolution" in given or isinstance(self.model, Path)  # an author knows his own sensors
+            stated = "resolution" in given or not isinstance(self.model, str)  # an author knows his own sensors
             signals.append(replace(signal, given=stated, **given))
         unknowns = self._unknowns(replace(model, knowns=knowns))
         following = replace(model.following, **self.identifier)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -15,6 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
@@ -22,7 +24,8 @@ from pvid.log.history import History
 from pvid.log.mechanism import LogMechanism
 from pvid.log.reader import LogReader
 from pvid.log.words import board_words, reason_words, residual_words, stage_words
-from pvid.show.axis_limits import interesting
+from pvid.show.answer_figure import PREDICTED, VALUE
+from pvid.show.axis_limits import interesting, plain_ticks
 
 Float = npt.NDArray[np.float64]
 
@@ -53,17 +56,7 @@ def write_log_figure(log: Path, mechanism: LogMechanism, path: Path) -> bool:
     figure, grid = plt.subplots(rows, _COLUMNS, squeeze=False, figsize=(13, 1.5 + 1.9 * rows), layout="constrained")
     try:
         axes = list(grid.T.flat)
-        for one, axis in zip(drawn, axes, strict=False):
-            limits = []
-            if one not in extras:
-                of_weak = t, history.estimates(one.name), history.estimates(f"{one.name}_se")
-                limits += _curve(axis, *of_weak, "C0", "weak form" if history.stage else "estimate")
-            if history.stage:
-                of_refined = history.refined("t"), history.refined(one.name), history.refined(f"{one.name}_se")
-                limits += _curve(axis, *of_refined, "C1", "refined, published where drawn")
-            if limits:
-                axis.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-            axis.set_ylabel(one.label)
+        _estimates(history, axes, "weak form" if history.stage else "estimate", "C0", "C1")
         rest = axes[len(drawn) :]
         _quality(history, rest[0], rest[1])
         seconds, *signals = history.samples()
@@ -84,6 +77,48 @@ def write_log_figure(log: Path, mechanism: LogMechanism, path: Path) -> bool:
     finally:
         plt.close(figure)
     return True
+
+
+def estimates_of(log: Path, mechanism: LogMechanism) -> tuple[Callable[[Figure], None], int] | None:
+    """Draws the estimates that a board published, in a panel for each of so many quantities; None: there is none."""
+    history = History(mechanism, points=_POINTS)
+    history.know(mechanism)
+    for record in LogReader(log):
+        history.take(record)
+    panels = len(mechanism.parameters) + len(history.extras)
+    if not len(history.estimates("t")):
+        return None
+
+    def draw(figure: Figure) -> None:
+        grid = figure.subplots(-(-panels // _COLUMNS), _COLUMNS, squeeze=False, sharex=True)
+        axes = list(grid.T.flat)
+        _estimates(history, axes, "first stage" if history.stage else "estimate", VALUE, PREDICTED)
+        for axis in axes[:panels]:
+            axis.grid(alpha=0.25)
+        for axis in axes[panels:]:
+            axis.set_axis_off()
+        axes[0].legend(fontsize="small")
+        for axis in grid[-1]:
+            axis.set_xlabel("time of the log [s]")
+
+    return draw, panels
+
+
+def _estimates(history: History, axes: Sequence[Axes], weak: str, *colors: str) -> None:
+    """Of each quantity over time, with its band; of both stages where there are two."""
+    t = history.estimates("t")
+    for one, axis in zip((*history.mechanism.parameters, *history.extras), axes, strict=False):
+        limits = []
+        if one not in history.extras:
+            of_weak = t, history.estimates(one.name), history.estimates(f"{one.name}_se")
+            limits += _curve(axis, *of_weak, colors[0], weak)
+        if history.stage:
+            of_refined = history.refined("t"), history.refined(one.name), history.refined(f"{one.name}_se")
+            limits += _curve(axis, *of_refined, colors[1], "refined, published where drawn")
+        if limits:
+            axis.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+        axis.set_ylabel(one.label)
+        plain_ticks(axis)
 
 
 def _curve(axis: Axes, t: Float, value: Float, se: Float, colour: str, name: str) -> list[tuple[float, float]]:

@@ -127,7 +127,7 @@ def _serve(listening: socket.socket, log: Path, title: str, address: str) -> Non
     from starlette.applications import Starlette
     from starlette.middleware import Middleware
     from starlette.requests import Request
-    from starlette.responses import FileResponse, PlainTextResponse, Response
+    from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
     from starlette.routing import Route
     from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -142,6 +142,14 @@ def _serve(listening: socket.socket, log: Path, title: str, address: str) -> Non
             return FileResponse(path, media_type=_TYPES[path.suffix], headers=headers)
 
         return Route("/" if path.suffix == ".html" else f"/{path.name}", respond)
+
+    def respond_report(_: Request) -> Response:
+        from pvid.show.log_report import report_of_log
+
+        try:
+            return HTMLResponse(report_of_log(log), headers=headers)
+        except PvidError as error:
+            return PlainTextResponse(f"There is no report: {error}", 422, headers)
 
     def respond_state(_: Request) -> Response:
         return Response(state.as_json(), media_type="application/json", headers=headers)
@@ -160,7 +168,8 @@ def _serve(listening: socket.socket, log: Path, title: str, address: str) -> Non
             await answer(scope, receive, send)
 
     files = [one for one in sorted(_ASSETS.iterdir()) if one.suffix in _TYPES]
-    application = Starlette(routes=[*map(asset, files), Route("/state", respond_state)], middleware=[Middleware(Guard)])
+    routes = [*map(asset, files), Route("/state", respond_state), Route("/report", respond_report)]
+    application = Starlette(routes=routes, middleware=[Middleware(Guard)])
     state.start()
     settings = uvicorn.Config(
         application, http=Impatient, ws="none", log_level="critical", limit_concurrency=_MOST_CLIENTS, lifespan="off"

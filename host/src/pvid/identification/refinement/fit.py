@@ -107,6 +107,11 @@ class Cut:
         firsts = [np.arange(size // length) * length + first for (first, _), size in zip(stretches, sizes, strict=True)]
         return cls(np.concatenate(firsts).astype(np.int32), length)
 
+    @property
+    def places(self) -> npt.NDArray[np.int64]:
+        """Of the samples in the run [blocks, samples]."""
+        return self.first[:, None] + np.arange(self.samples)
+
     def rows(self, values: Float) -> Float:
         """Samples by blocks [blocks, samples, ...]."""
         return np.stack([values[first : first + self.samples] for first in self.first])

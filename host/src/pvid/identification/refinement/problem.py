@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.refine import LOG_SD
-from pvid.identification.answer import Analysis
 from pvid.identification.refinement.fit import (
     NOISE,
     Cut,
@@ -192,21 +191,6 @@ def prior_about(problem: Problem, r: Float) -> Prior:
     parameters = problem.kernel.made.parameters
     sd = np.array([LOG_SD if one.log and not one.sign else one.prior_sd for one in parameters])
     return Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~problem.is_width)
-
-
-def simulated_at(answer: Analysis, p: Float) -> RefinedMechanism:
-    """The motion of a recording at p [n_p]: the starts of its blocks, of two windows each, are fitted to it.
-
-    Raises
-    ------
-    PvidError
-        Where the equations cannot be simulated on it.
-    """
-    model, recording = answer.model, answer.recording
-    rate = recording.sample_rate
-    problem, r = problem_of(model, recording.run, rate, p)
-    cut = problem.cut(max(8, round(2 * answer.found.design.window_s * rate)))
-    return RefinedMechanism(problem, problem.with_starts(prior_about(problem, r), cut))
 
 
 def softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:
