@@ -30,7 +30,8 @@ SLOW = """
     cli/cli cli/identify_in_c cli/identify_run oracle/missing identification/refined_search bench/random_models
     log/log show/page twin/weak_q31 identification/work board/memory identification/mechanism_advice
     codegen/strong_model cli/design_cost paper/paper cli/run_input bench/refine_mechanisms show/answer_figure
-    board/stream bench/attack identification/refined_answer identification/refined_kinds oracle/samples board/ports
+    show/report board/stream bench/attack identification/refined_answer identification/refined_kinds oracle/samples
+    board/ports
     identification/additions deploy/deploy twin/weak_f32 codegen/build bench/liar cli/demo_run identification/judge
     tools/pages core/trust_q31 cli/api identification/scale_errors board/targets identification/own_mechanisms
     core/core_q31 identification/refined twin/second_stage show/view board/refined_board tools/wheel

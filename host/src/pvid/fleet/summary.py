@@ -20,6 +20,7 @@ from pvid.show.document import document, picture, table, text
 _DAY = 86400.0
 _DRIFTS = 4.0  # standard errors of the slope
 _MOST_BOARDS = 10  # with a colour of their own
+_LONGEST = 40  # letters of a board in the figure's legend: its last ones
 
 
 @dataclass(frozen=True)
@@ -176,11 +177,12 @@ def _drawn(figure: Figure, good: Sequence[Row], names: Sequence[tuple[str, str]]
                 linewidth=0.8,
                 capsize=2,
                 color=f"C{number}" if len(boards) <= _MOST_BOARDS else "C0",
-                label=board,
+                label=board if len(board) <= _LONGEST else f"...{board[-_LONGEST:]}",
             )
         panel.set_ylabel(f"{name} [{unit}]" if unit else name)
         panel.grid(alpha=0.3)
     panels[-1].set_xlabel("date (UTC)")
     panels[-1].tick_params(axis="x", rotation=20)
     if 1 < len(boards) <= _MOST_BOARDS:
-        panels[0].legend(fontsize="small", ncols=min(4, len(boards)), loc="lower left", bbox_to_anchor=(0, 1))
+        columns = max(1, 2 * _LONGEST // min(_LONGEST, max(map(len, boards))))
+        panels[0].legend(fontsize="small", ncols=min(4, columns), loc="lower left", bbox_to_anchor=(0, 1))
