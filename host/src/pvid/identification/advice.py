@@ -118,7 +118,7 @@ def _turned(answer: Analysis) -> Iterator[tuple[float, str, str]]:
     if max(answer.found.r2.values(), default=0.0) > _EXPLAINS:
         return
     for signal in answer.model.signals:
-        if signal.driven or signal.kind == "input":
+        if (signal.driven or signal.kind == "input") and not work.is_spent():
             signals = {**answer.recording.signals, signal.name: -answer.recording.signals[signal.name]}
             turned = replace(answer.recording, signals=signals)
             again = attempted(partial(analysed, turned, answer.model, answer.weights))

@@ -123,6 +123,7 @@ class Budget:
     share it, and stop where it is spent."""
 
     left: float = np.inf
+    whole: float = np.inf
 
     @property
     def is_spent(self) -> bool:

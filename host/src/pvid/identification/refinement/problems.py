@@ -78,7 +78,8 @@ class Problems:
         self._slow = slow
         self._signals, self._begins = signals, begins_of(signals, self._mean)
         samples = len(next(iter(signals.values())))
-        self.budget = Budget(_WORK * min(samples, _LONG) + _WORK_BEYOND * max(samples - _LONG, 0))
+        whole = _WORK * min(samples, _LONG) + _WORK_BEYOND * max(samples - _LONG, 0)
+        self.budget = Budget(whole, whole)
         self._problems: dict[tuple[str, ...], Problem] = {}
         self.first = [one.name for one in made.parameters if one.place >= 0]
         own = [one.name for one in made.parameters if one.place < 0 and not one.sign]

@@ -53,6 +53,10 @@ _CHEAP = 1.3  # growth of the others' standard errors up to which an extra is fr
 _TOLD = 9.0  # fall of the sum of squares from which it is free in any case
 _UNSURE = 0.05  # standard error of a logarithm from which friction is searched where residuals are no noise
 
+# Mean square of slow residuals in short blocks, over that of the sensors' noise, from which a motion that is not found
+# is another one; and the part of the budget after which no further start is tried then.
+_UNLIKE, _TRIED = 1e4, 0.1
+
 TOO_LONG = "the refinement needs too many steps: the recording is long, or the guess has too fast a motion"
 
 
@@ -103,7 +107,7 @@ class _Search:
         else:
             starts = self._starts[:1] if self._explained else self._starts
             outcomes = self._outcomes(problem, starts, self._sure, known=outcomes)
-            if not outcomes:
+            if _are_unlike(outcomes):
                 spent = every.budget.is_spent
                 raise PvidError(TOO_LONG if spent else "the refinement finds no motion that is like the recorded one")
             found, rivals = self._of_outcomes(problem, outcomes)
@@ -145,7 +149,8 @@ class _Search:
         searched besides those of the weak form. `known`: outcomes before."""
         outcomes = list(known)
         for values in starts:
-            if self._all.budget.is_spent:
+            budget = self._all.budget
+            if budget.is_spent or (_are_unlike(outcomes) and budget.left < (1 - _TRIED) * budget.whole):
                 break
             found = self._searched(problem, values, more)
             if found is None:
@@ -351,6 +356,11 @@ def _main(problem: Problem, small: set[int]) -> list[int]:
 def _longer(problem: Problem, found: Refined) -> int:
     """Of the next blocks [samples]."""
     return min(_LONGER * found.cut.samples, problem.longest)
+
+
+def _are_unlike(outcomes: Sequence[Refined]) -> bool:
+    """Whether no start has led to a motion that is like the recorded one."""
+    return not any(one.converged or one.slow_chi2 < _UNLIKE for one in outcomes)
 
 
 def _likeliest(outcomes: Sequence[Refined]) -> Refined:

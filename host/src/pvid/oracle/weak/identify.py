@@ -129,7 +129,7 @@ ready = Recent(Compiled)  # a model with its functions
 
 # Of the work that is allowed to the search for a design: that of the rest where it finds a plausible estimate, terms
 # that are missing included, where it finds none, and where the equations explain nothing of a row.
-_OF_KNOWN, _OF_UNKNOWN, _OF_HOPELESS = 5.0, 0.5, 0.1
+_OF_KNOWN, _OF_UNKNOWN, _OF_HOPELESS = 1.5, 0.3, 0.1
 
 
 def allowance_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> float:

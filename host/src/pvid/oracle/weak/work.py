@@ -12,7 +12,9 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-_PASSES = 500  # of a search in the designs that are usually chosen; one that fits takes a tenth to a half of them
+# Of a search in the designs that are usually chosen, and of a long recording, which shows earlier where it leads: one
+# that fits takes a tenth to a half of them.
+_PASSES, _PASSES_OF_LONG = 500, 150
 _OF_A_PASS, _OF_A_STEP = 2.0, 0.15
 _OF_ROWS, _OF_REVERSALS = 1.5e-7, 3.5e-6  # of a product of a column's entries: of all windows, of located reversals
 _FUNCTIONS = 40
@@ -48,7 +50,8 @@ def allowance(kinds: int, columns: int, reversals: int, samples: int) -> float:
     reversals : of its signs
     """
     entries = 2 * min(reversals, samples / _SAMPLES_OF_A_REVERSAL)
-    return _PASSES * of_pass(samples / _SAMPLES_OF_A_WINDOW, kinds * _FUNCTIONS, columns, entries)
+    whole = of_pass(samples / _SAMPLES_OF_A_WINDOW, kinds * _FUNCTIONS, columns, entries)
+    return _PASSES * _OF_A_PASS + _PASSES_OF_LONG * (whole - _OF_A_PASS)
 
 
 def of_pass(windows: float, rows: int, columns: int, entries: float) -> float:
