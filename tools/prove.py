@@ -289,6 +289,12 @@ PROOFS = (
         ("link/link.c",),
         deduced=("pvid_link_encode", "stuff", "pvid_put_u16", "pvid_put_u32"),
     ),
+    Proof(
+        "excite",
+        "two parts of any kind, any limits and times that init accepts, any phases, stops and aborts at any tick",
+        ("src/excite/excite_f32.c", "src/number/elementary_f32.c", "src/number/finite_f32.c"),
+        ("-eva-min-loop-unroll", "16", "-eva-domains", "equality,symbolic-locations", "-eva-slevel", "20"),
+    ),
 )
 
 

@@ -137,3 +137,12 @@ def test_a_setting_of_a_hundred_thousand_parts_is_one_sentence() -> None:
     with pytest.raises(PvidError, match="has too many parts: it is KEY=VALUE, as in --set known.g=9.81") as refused:
         with_settings({}, ["known." + "a." * 100_000 + "b=1"])
     assert len(str(refused.value)) < 200
+
+
+def test_limits_of_a_commissioning_are_read_and_written() -> None:
+    text = '[model]\nname = "dc_motor"\n[excitation]\nburst_s = 2.0\n[excitation.V]\nlimit = 12\n'
+    rig = MechanismRig.parse(text)
+    assert rig.excitation == {"": {"burst_s": 2.0}, "V": {"limit": 12.0}}
+    assert MechanismRig.parse(rig.text()) == rig
+    with pytest.raises(PvidError, match=r"excitation\.V\.limit must be a number"):
+        MechanismRig.parse(text.replace("12", '"12 V"'))

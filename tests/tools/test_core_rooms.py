@@ -12,7 +12,7 @@ import pytest
 from pvid.core.sources import INCLUDES, SRC, core_sources
 
 # Each room may use itself and those before it; the forms do not use each other.
-ROOMS = ("number", "solve", "judge", "strong", "weak", "refine", "persist")
+ROOMS = ("number", "solve", "judge", "strong", "weak", "refine", "excite", "persist")
 FORMS = ("strong", "weak", "refine")
 STRANGERS = {(a, b) for a in FORMS for b in FORMS if a != b}
 

@@ -7,9 +7,11 @@
 #define PVID_PVID_H
 
 #include "pvid/arithmetic.h"
+#include "pvid/commission.h"
 #include "pvid/crc32.h"
 #include "pvid/differentiator.h"
 #include "pvid/estimator.h"
+#include "pvid/excite.h"
 #include "pvid/fnv.h"
 #include "pvid/fnv_refine.h"
 #include "pvid/gate.h"

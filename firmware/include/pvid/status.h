@@ -51,7 +51,18 @@ typedef enum {
     PVID_BAD_RENEWAL,       /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
     PVID_BAD_NEGLECTED,     /* of trust.h: outside 0..1 */
     PVID_BAD_POINTER,       /* the object, the configuration or the bank is NULL */
-    PVID_BAD_LAYOUT /* library and application were compiled with different sizes: layout.h; nothing was written */
+    PVID_BAD_LAYOUT, /* library and application were compiled with different sizes: layout.h; nothing was written */
+    PVID_BAD_EXCITE_PARTS,     /* of an excitation: none or too many, an unknown kind, or steps without levels */
+    PVID_BAD_EXCITE_AMPLITUDE, /* of a part: not finite or outside 0..1e6; a level outside -1..1 */
+    PVID_BAD_EXCITE_FREQUENCY, /* of a part: not finite, not positive, above half the sample rate, or a phase or a sweep
+                                  out of its range */
+    PVID_BAD_EXCITE_LIMIT,     /* of a drive: not finite, beyond 1e6, or not low <= 0 <= high with low < high */
+    PVID_BAD_EXCITE_SLEW,      /* of a drive: not finite, above 1e12, or below 1e-6 of the wider limit in a tick */
+    PVID_BAD_EXCITE_TIME,      /* ramp_s or burst_s: not finite, below a tick, above 1e6 s or 2.1e9 ticks */
+    PVID_BAD_EXCITE_GUARD,     /* too many, NULL, not low < soft_low < soft_high < high, or a field out of its range */
+    PVID_BAD_COMMISSION_DRIVES, /* too many, of unequal ramps or rates, a burst that is too short, or no such sample */
+    PVID_BAD_COMMISSION_RING,   /* ring, burst or passes out of range, or a ring too short for several passes */
+    PVID_BAD_COMMISSION_CHECK   /* check_scale, agree, misfit_max or restrained_max out of its range */
 } pvid_status;
 
 /* Result of a tick. Every estimate is reported together with one of these. */

@@ -70,6 +70,16 @@ static const char *const statuses[] = {
     "bad neglected: of trust.h: outside 0..1",
     "bad pointer: the object, the configuration or the bank is NULL",
     "bad layout: library and application were compiled with different sizes: layout.h; nothing was written",
+    "bad excite parts: of an excitation: none or too many, an unknown kind, or steps without levels",
+    "bad excite amplitude: of a part: not finite or outside 0..1e6; a level outside -1..1",
+    "bad excite frequency: of a part: not finite, not positive, above half the sample rate, or a phase or a sweep out of its range",
+    "bad excite limit: of a drive: not finite, beyond 1e6, or not low <= 0 <= high with low < high",
+    "bad excite slew: of a drive: not finite, above 1e12, or below 1e-6 of the wider limit in a tick",
+    "bad excite time: ramp_s or burst_s: not finite, below a tick, above 1e6 s or 2.1e9 ticks",
+    "bad excite guard: too many, NULL, not low < soft_low < soft_high < high, or a field out of its range",
+    "bad commission drives: too many, of unequal ramps or rates, a burst that is too short, or no such sample",
+    "bad commission ring: ring, burst or passes out of range, or a ring too short for several passes",
+    "bad commission check: check_scale, agree, misfit_max or restrained_max out of its range",
 };
 /* clang-format on */
 

@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pvid.base.console import DONE, write_stderr
+from pvid.base.console import DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, force_option
 from pvid.cli.rig_design import model_of_rig, recorded
 from pvid.settings.cores import CORES, FIXED, FLOAT
 
 if TYPE_CHECKING:
+    from pvid.configuration.excitation import Excitation
     from pvid.deploy.deployment import Deployment
+    from pvid.model.compiled import CompiledModel
+    from pvid.rig.mechanism_file import MechanismRig
     from pvid.settings.enums import Core
     from pvid.settings.refine import RefineConfig
 
@@ -49,6 +52,10 @@ def command(
     identifies a recorded motion, and a README. `--for amalgamation` writes two files to copy.
 
     The rig is that of --run, a recording, or the shipped rig of a shipped mechanism.
+
+    Where the rig file has the limits of a commissioning, [excitation], the package contains one: an excitation within
+    these limits, designed for the least standard errors, its identification and its check (NAME_commission.h). It needs
+    no recording: without --run the design is made from a simulation at the guesses.
     """
     from pvid.deploy.targets import write_package
 
@@ -92,14 +99,18 @@ def _deployment(
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     refuse_too_many_unknowns(compiled)
-    if run_path is not None:
-        recording = recorded(compiled, rig, run_path, columns)
+    excitation = None if rig is None or not rig.excitation else _excitation(compiled, rig, is_integer)
+    if run_path is not None or excitation is not None:
+        recording = excitation.recording if excitation is not None else None
+        if run_path is not None:
+            recording = recorded(compiled, rig, run_path, columns)
+        assert recording is not None
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
         if is_integer:
             return deployment_q31(weak_q31_for_recording(compiled, recording, functions), recording.signals, title)
         config = config_for_recording(compiled, recording, functions)
         refine = _noted(lambda: refine_design(compiled, config, recording.signals))
-        return deployment_f32(compiled, config, recording.signals, title, refine)
+        return deployment_f32(compiled, config, recording.signals, title, refine, excitation)
     if model not in names_of_shipped():
         raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
     run = simulated_run_of(compiled)[0]
@@ -108,6 +119,25 @@ def _deployment(
     config = config_for_rig_like_the_shipped(compiled, functions)
     refine = _noted(lambda: refine_for_simulated_rig(compiled, config))
     return deployment_f32(compiled, config, full_motion_of(compiled), title, refine)
+
+
+def _excitation(compiled: CompiledModel, rig: MechanismRig, is_integer: bool) -> Excitation:
+    """The excitation of a commissioning, designed within the limits of the rig file."""
+    from pvid.codegen.weak import weak_functions_of
+    from pvid.configuration.excitation import MOST_DRIVES, designed
+
+    if is_integer:
+        raise PvidError("a commissioning needs float32: leave --core q31 out, or [excitation] of the rig file")
+    if rig.sample_rate is None:
+        raise PvidError("the sample rate of the commissioning is missing: sample_rate = 2000  # Hz, in the rig file")
+    with progress_bar("drives", MOST_DRIVES) as advance:
+        return designed(
+            compiled,
+            rig.excitation,
+            rig.sample_rate,
+            samples=weak_functions_of(compiled).samples,
+            progress=advance,
+        )
 
 
 def _noted(made: Callable[[], RefineConfig]) -> RefineConfig | None:

@@ -7,11 +7,10 @@ from collections import Counter
 from collections.abc import Mapping
 
 from pvid.deploy.cmake import main_of
-from pvid.deploy.core_files import core_files, includes_of
+from pvid.deploy.core_files import includes_of
 from pvid.deploy.deployment import Deployment, Files
 from pvid.deploy.example import example_files
-from pvid.deploy.identifier import identifier_files
-from pvid.deploy.library import licence, sources
+from pvid.deploy.library import all_files, licence, sources
 from pvid.deploy.readme import readme
 
 _OWN_INCLUDE = re.compile(r'^#include "([^"]+)"[^\n]*\n', re.MULTILINE)
@@ -38,7 +37,7 @@ def amalgamated(d: Deployment) -> tuple[str, str]:
     The header has the identifier's functions alone. Functions of the core get the mechanism's name in front, so that
     two mechanisms can be in one program; the texts are weak, since both have them.
     """
-    files = core_files(d) | dict(d.generated) | identifier_files(d)
+    files = all_files(d)
     own = f"{d.name}_identifier.h"
     header = [files["pvid/status.h"], files[_TEXTS], files[own]]
     top = f"/* {d.library}.h and {d.library}.c: pvid in two files, with its licence in LICENSE.\n *\n * {d.banner} */\n"
@@ -48,14 +47,16 @@ def amalgamated(d: Deployment) -> tuple[str, str]:
     ]
     parts = _parts(files)
     done = {*_IN_HEADER, own, *parts}
+    commission = [_inlined(f"{d.name}_commission.h", files, done)] if d.excitation is not None else []
     wanted = [_FIRST] if _FIRST in files else []
     wanted += [one for name in (*sources(files), *parts) for one in includes_of(files[name])]
     source += [_inlined(name, files, done) for name in wanted]
     source += _units(files)
     public = {name for path in sources(files) for name in _PUBLIC.findall(_COMMENT.sub("", files[path]))}
     texts = {"pvid_reason_text", "pvid_status_text"}
-    whole = _renamed("\n".join(source), {name: f"{d.name}_{name}" for name in public - texts})
-    return top + "".join(f"\n{_plain(one)}" for one in header), whole
+    names = {name: f"{d.name}_{name}" for name in public - texts}
+    header += [_renamed(one, names) for one in commission]
+    return top + "".join(f"\n{_plain(one)}" for one in header), _renamed("\n".join(source), names)
 
 
 def _inlined(name: str, files: Mapping[str, str], done: set[str]) -> str:

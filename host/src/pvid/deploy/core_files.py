@@ -13,7 +13,7 @@ from pvid.deploy.arithmetic import Arithmetic
 from pvid.deploy.deployment import Deployment, Files
 
 _ROOMS = ("number", "solve", "judge", "weak", "persist")
-_REFINED = "refine"  # a room that some deployments have
+_REFINED, _EXCITE = "refine", "excite"  # rooms that some deployments have
 _OF_MODEL = ("pvid/refine_shape.h", "refine_model_f32.h")  # which come with the mechanism
 _INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 _OWN_CONFIG = "#ifdef PVID_CONFIG_HEADER\n#include PVID_CONFIG_HEADER\n#endif\n"
@@ -21,10 +21,11 @@ SIZES = "pvid/rig_sizes.h"
 
 
 @cache
-def _files(arithmetic: Arithmetic, refined: bool) -> dict[str, Path]:
+def _files(arithmetic: Arithmetic, refined: bool, excited: bool) -> dict[str, Path]:
     """Name below the include path -> file: sources of the rooms whose headers the deployment has, and these headers."""
     found: dict[str, Path] = {}
     rooms, given = ((*_ROOMS, _REFINED), _OF_MODEL) if refined else (_ROOMS, ())
+    rooms = (*rooms, _EXCITE) if excited else rooms
     for room in rooms:
         for path in sorted((SRC / room).glob("*.c")):
             headers = None if path.stem.endswith(arithmetic.without) else _headers_of(path, rooms, given)
@@ -52,7 +53,7 @@ def _headers_of(source: Path, rooms: tuple[str, ...], given: tuple[str, ...]) ->
 
 def _included(texts: Iterable[str], known: Mapping[str, Path]) -> dict[str, Path]:
     """Headers of the core that generated files include beside the known ones."""
-    rooms = (*_ROOMS, _REFINED)
+    rooms = (*_ROOMS, _REFINED, _EXCITE)
     paths = [_path(name) for text in texts for name in includes_of(text) if name not in known]
     headers = [{path} | (_headers_of(path, rooms, _OF_MODEL) or set()) for path in paths if path.is_file()]
     return {_name(path): path for group in headers for path in sorted(group)}
@@ -79,7 +80,7 @@ def core_files(deployment: Deployment) -> Files:
     PvidError
         When pvid/config.h has no place for them.
     """
-    found = _files(deployment.arithmetic, deployment.second is not None)
+    found = _files(deployment.arithmetic, deployment.second is not None, deployment.excitation is not None)
     found |= _included(deployment.generated.values(), found)
     files = {name: path.read_text(encoding="utf-8") for name, path in found.items()}
     config = files["pvid/config.h"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from pvid.configuration.excitation import Excitation
 from pvid.deploy.arithmetic import Arithmetic
 from pvid.settings.enums import Reason
 
@@ -84,6 +85,7 @@ class Deployment:
     command : that makes it; no date
     first_s : of motion up to the first window that is judged [s]
     second : the refinement; None: the package has none
+    excitation : of the commissioning; None: the package has none
     """
 
     name: str
@@ -98,6 +100,7 @@ class Deployment:
     first_s: float
     playback: Playback = field(repr=False)
     second: SecondStage | None = None
+    excitation: Excitation | None = None
 
     @property
     def core(self) -> str:

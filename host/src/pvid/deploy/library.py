@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pvid.core.sources import ROOT
+from pvid.deploy.commission import commission_files
 from pvid.deploy.core_files import core_files
 from pvid.deploy.deployment import Deployment, Files
 from pvid.deploy.identifier import identifier_files
@@ -12,8 +13,17 @@ from pvid.deploy.identifier import identifier_files
 
 def library_files(deployment: Deployment, folder: str = "src") -> Files:
     """Everything that is compiled, in one folder that is the only include path."""
-    files = core_files(deployment) | dict(deployment.generated) | identifier_files(deployment)
-    return under(folder, files)
+    return under(folder, all_files(deployment))
+
+
+def all_files(deployment: Deployment) -> Files:
+    """Name -> text of the core's and the mechanism's files."""
+    return (
+        core_files(deployment)
+        | dict(deployment.generated)
+        | identifier_files(deployment)
+        | commission_files(deployment)
+    )
 
 
 def under(folder: str, files: Mapping[str, str]) -> Files:

@@ -15,6 +15,7 @@ from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.codegen.weak_q31 import WeakQ31
+from pvid.configuration.excitation import Excitation
 from pvid.configuration.weak import Run, samples_of
 from pvid.core.weak_native import RefinedRecord
 from pvid.deploy.arithmetic import FIXED, FLOAT
@@ -32,7 +33,12 @@ _PUBLISHED = (Reason.UPDATED, Reason.MISFIT)
 
 
 def deployment_f32(
-    compiled: CompiledModel, config: WeakConfig, run: Run, command: str, refine: RefineConfig | None = None
+    compiled: CompiledModel,
+    config: WeakConfig,
+    run: Run,
+    command: str,
+    refine: RefineConfig | None = None,
+    excitation: Excitation | None = None,
 ) -> Deployment:
     """In float32.
 
@@ -42,6 +48,7 @@ def deployment_f32(
     run : of the rig, for the example: name of each signal -> samples [n]
     command : that makes it, for the banners
     refine : settings of the refinement; None: the package has none
+    excitation : of the commissioning; None: the package has none
 
     Raises
     ------
@@ -87,6 +94,7 @@ def deployment_f32(
         first_s=config.ticks_needed / config.sample_rate,
         playback=playback,
         second=second,
+        excitation=excitation,
     )
 
 

@@ -20,6 +20,12 @@
     forgetting_s = 20         # how the estimate follows a change: see Following
     [refine]
     dry_friction = true       # options of the model's second stage in C
+    [excitation]
+    burst_s = 2.0             # of a commissioning (pvid.configuration.excitation)
+    [excitation.V]
+    limit = 12                # largest absolute value of a drive or a signal, in its unit
+    [excitation.phi]
+    speed = 400               # largest rate of a signal [unit/s]
 
 A key that the model does not have becomes a PvidError that names it and lists those that it has.
 """
@@ -45,7 +51,18 @@ if TYPE_CHECKING:  # it loads SymPy
 
 _Read = TypeVar("_Read")
 
-_KEYS = ("sample_rate", "clock_sd", "model", "known", "known_sd", "sensor", "nominal", "identifier", "refine")
+_KEYS = (
+    "sample_rate",
+    "clock_sd",
+    "model",
+    "known",
+    "known_sd",
+    "sensor",
+    "nominal",
+    "identifier",
+    "refine",
+    "excitation",
+)
 _OF_AN_INPUT = ("gain_sd", "reach")
 OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected", "delay", "reach")
 _POSITIVE = ("reach", "sample_rate")
@@ -68,6 +85,7 @@ class MechanismRig:
     nominal : guesses of unknowns, or of outputs, from which those of unknowns follow
     identifier : what differs from Following's defaults
     refine : options of the refinement in C that are chosen or not
+    excitation : limits of a commissioning by signal; "": its burst; {}: there is none
     clock_sd : relative standard deviation of the sample rate; None: the model's
     """
 
@@ -79,6 +97,7 @@ class MechanismRig:
     known_sd: Mapping[str, float] = field(default_factory=dict)
     identifier: Mapping[str, float] = field(default_factory=dict)
     refine: Mapping[str, bool] = field(default_factory=dict)
+    excitation: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     clock_sd: float | None = None
 
     @classmethod
@@ -111,6 +130,7 @@ class MechanismRig:
             known_sd=_numbers(_table(document, "known_sd"), "known_sd"),
             identifier=_numbers(_table(document, "identifier"), "identifier", OF_THE_IDENTIFIER),
             refine=_switches(_table(document, "refine"), "refine"),
+            excitation=_excitation(_table(document, "excitation")),
             **top,
         )
 
@@ -123,6 +143,7 @@ class MechanismRig:
         tables: dict[str, Mapping[str, float]] = {"known": self.known, "known_sd": self.known_sd}
         tables |= {f"sensor.{name}": keys for name, keys in self.sensor.items()}
         tables |= {"nominal": self.nominal, "identifier": self.identifier}
+        tables |= {f"excitation.{name}".rstrip("."): keys for name, keys in self.excitation.items()}
         for name, keys in tables.items():
             if keys:
                 lines += ["", f"[{name}]", *(f"{key} = {value!r}" for key, value in keys.items())]
@@ -278,6 +299,16 @@ def _numbers(table: Mapping[str, Any], place: str, keys: Collection[str] | None 
         if key in _POSITIVE and value == 0:
             raise PvidError(f"{place}.{key} must be positive".removeprefix("."))
     return {key: float(value) for key, value in table.items()}
+
+
+def _excitation(table: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    """Its own keys under "", then a table for each signal."""
+    own = {key: value for key, value in table.items() if not isinstance(value, Mapping)}
+    found = {"": _numbers(own, "excitation")} if own else {}
+    for name, keys in table.items():
+        if isinstance(keys, Mapping):
+            found[name] = _numbers(keys, f"excitation.{name}")
+    return found
 
 
 def _switches(table: Mapping[str, Any], place: str) -> dict[str, bool]:
