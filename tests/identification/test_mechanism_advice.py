@@ -10,7 +10,8 @@ import numpy.typing as npt
 import pytest
 from pendulum_plant import simulate
 
-from pvid.identification.advice import advice_on
+from pvid.base.wording import listed
+from pvid.identification.advice import advice_on, advised
 from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
 from pvid.model import Model, sgn, sin
@@ -21,6 +22,7 @@ from pvid.oracle.weak.identify import identify
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.rig.sensor_steps import with_resolutions
+from pvid.sim.simulated_run import simulation_of
 
 Float = npt.NDArray[np.float64]
 
@@ -160,6 +162,29 @@ def test_input_that_never_changes_is_named() -> None:
     assert advice_of(case, run | {"F": np.full(len(run["F"]), 1.5)}) == (
         "F is 1.5 N in every sample: is it the column of the drive?",
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "signals", "factor", "unit"),
+    [
+        ("rigid_body", ["w0", "w1", "w2"], 30 / np.pi, "rpm"),
+        ("two_link_arm", ["q1", "q2"], 180 / np.pi, "deg"),
+        ("two_link_arm", ["t1", "t2"], 1e3, "mN*m"),
+    ],
+)
+def test_columns_that_are_all_in_another_unit_are_named_together(
+    name: str, signals: list[str], factor: float, unit: str
+) -> None:
+    """None of them explains the run by itself; nor do the terms that seem to lack, which are not proposed beside it."""
+    model, simulation = compiled_of(name), simulation_of(name)
+    run = {key: values[:6000] for key, values in simulation.run(3).items()}
+    run |= {one: factor * run[one] for one in signals}
+    rate = simulation.rig.sample_rate
+    found = identify(model, run, rate, design=WeakDesign(rate, 1.0, 12, 6))
+    answer = advised(Analysis(model, found, {}, Recording(np.arange(6000) / rate, run, rate)))
+    si = model.signal(signals[0]).unit
+    typed = ",".join(f"{one}={one}:{unit}" for one in signals)
+    assert answer.advice == (f"{listed(signals)} seem to be in {unit}, not {si}: --columns {typed}",)
 
 
 STEP = 2 * np.pi / 2**14

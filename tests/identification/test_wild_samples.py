@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -101,6 +102,39 @@ def test_error_codes_of_a_current_are_interpolated_though_it_has_corners(code: f
     assert np.median(np.abs(cleaned.signals["i"] - recording.signals["i"])[cleaned.signals["i"] != i]) < 0.2
     assert len(cleaned.notes) == 1
     assert cleaned.notes[0].split("samples of i")[1].startswith(f" are far from those about it ({code:g} A in ")
+
+
+@pytest.mark.parametrize("code", [-9999.0, 65535.0])
+@pytest.mark.parametrize("name", ["dc_motor", "battery_2rc", "rigid_body"])
+def test_error_codes_of_any_signal_are_interpolated(name: str, code: float) -> None:
+    """Also of what may jump: a measured current that drives, an input; and of samples side by side."""
+    recording, model = recorded(name), compiled_of(name)
+    random = np.random.default_rng(3)
+    for one in model.signals:
+        x = recording.signals[one.name].copy()
+        places = random.choice(np.arange(1, len(x) - 2), max(4, len(x) // 200), replace=False)
+        places = np.unique([*places, places[0] + 1])
+        x[places] = code
+        cleaned = without_wild_samples(replace(recording, signals={**recording.signals, one.name: x}), model)
+        assert np.abs(cleaned.signals[one.name]).max() <= 1.2 * np.abs(recording.signals[one.name]).max(), one.name
+        assert [note.split(" of ")[1].split()[0] for note in cleaned.notes] == [one.name]
+        assert f"({code:g} {one.unit} in {len(places)} of them" in cleaned.notes[0]
+        x[random.random(len(x)) < 0.06] = code
+        with pytest.raises(PvidError, match=f"{one.name} is far .* {code:g} {re.escape(one.unit)}: an error code"):
+            without_wild_samples(replace(recording, signals={**recording.signals, one.name: x}), model)
+
+
+def test_strokes_of_an_input_are_no_error_codes() -> None:
+    """A hammer: a force that is 0 but for strokes of many sizes; an input that has two levels."""
+    recording, model = recorded("rigid_body"), compiled_of("rigid_body")
+    random = np.random.default_rng(4)
+    struck = 1e-4 * random.standard_normal(8000)
+    struck[500::500] = random.uniform(1, 3, len(struck[500::500]))
+    levels = np.where(np.arange(8000) % 400 < 8, 5.0, 0.0)
+    signals = {**recording.signals, "m0": struck, "m1": levels}
+    found = without_wild_samples(replace(recording, signals=signals), model)
+    assert found.signals["m0"] is struck
+    assert found.signals["m1"] is levels
 
 
 def test_a_current_that_follows_short_pulses_of_the_voltage_has_no_error_codes() -> None:

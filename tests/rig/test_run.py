@@ -193,7 +193,7 @@ def test_a_table_with_many_damaged_lines_is_refused(lines: list[str], parts: lis
         assert part in sentence, sentence
 
 
-@pytest.mark.parametrize("cell", ["-inf", "1e999", "9.90000E+37", "OL"])
+@pytest.mark.parametrize("cell", ["-inf", "1e999", "9.90000E+37", "-9.9E37", "OL"])
 def test_an_overload_is_missing(cell: str, tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text(changed(12, f"0.01,{cell},0"))

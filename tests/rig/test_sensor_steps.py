@@ -63,13 +63,20 @@ def test_values_that_are_not_numbers_are_left_out() -> None:
     assert resolution_of(values) == pytest.approx(0.01, rel=1e-6)
 
 
-def test_interpolated_samples_do_not_show_another_step() -> None:
+@pytest.mark.parametrize("share", [0.001, 0.01, 0.05])
+@pytest.mark.parametrize("size", [0.1, 1.0, 30.0])
+def test_interpolated_samples_do_not_show_another_step(size: float, share: float) -> None:
+    """Of a fast encoder each level is seen once, as those of interpolated samples are."""
     step = 2 * np.pi / 2**12
-    values = recorded(step, 0.1)
-    filled = np.random.default_rng(3).choice(np.arange(1, T.size - 1), 60, replace=False)
-    values[filled] = (values[filled - 1] + values[filled + 1]) / 2
-    values[filled[::2]] += 0.3 * step
-    assert resolution_of(values) == pytest.approx(step, rel=1e-3)
+    for seed in range(3):
+        values = recorded(step, size)
+        random = np.random.default_rng(seed)
+        filled = random.choice(np.arange(1, T.size - 1), max(1, int(share * T.size)), replace=False)
+        halves = (values[filled - 1] + values[filled + 1]) / 2
+        values[filled] = halves
+        assert resolution_of(values) == pytest.approx(step, rel=1e-3)
+        values[filled[::2]] += random.uniform(-0.5, 0.5, filled[::2].size) * step
+        assert resolution_of(values) == pytest.approx(step, rel=1e-3)
 
 
 @pytest.mark.parametrize(("name", "sensor"), [("kapitza", "phi"), ("cart_pendulum", "a")])

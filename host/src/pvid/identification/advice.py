@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from pvid.base.wording import with_unit
+from pvid.base.wording import listed, with_unit
 from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel, Signal
@@ -36,22 +37,33 @@ _ALIKE = 1.05  # times the least part that is left
 _EXPLAINS = 0.9  # R^2 of rows that explain a recording
 _TIMES = ("ms", "us")
 _OF_ANALYSIS = 0.3  # of the work that is allowed to a search for a design: that of the search for a mistake
-# By unit: what a column may be in instead, and what to type for it.
+# By unit: what a column may be in instead.
 _UNITS = {
-    "rad": {"deg": "deg", "rev": "rev"},
-    "rad/s": {"deg/s": f"{np.pi / 180:.9g}"},
-    "m": {"mm": "mm", "cm": "cm"},
-    **{unit: {f"m{unit}": f"m{unit}"} for unit in ("A", "V", "N")},
+    "rad": ("deg", "rev"),
+    "rad/s": ("rpm", "deg/s"),
+    "m": ("mm", "cm"),
+    "m/s": ("mm/s", "km/h"),
+    **{unit: (f"m{unit}",) for unit in ("A", "V", "N", "N*m")},
 }
+
+
+class _Mistake(NamedTuple):
+    """Part of the residuals that is left without it, the largest factor of a parameter's guess then; in words, and what
+    to type."""
+
+    left: float
+    distance: float
+    said: str
+    typed: str
 
 
 def advised(answer: Analysis) -> Analysis:
     """The answer with its advice: a column that is wrong, else what to type for the terms that seem to lack."""
     found = advice_on(answer)
-    if answer.found.named is not None and answer.identified:
+    if not found and answer.found.named is not None and answer.identified:
         from pvid.identification.additions import to_type
 
-        found = (*found, *to_type(answer))
+        found = tuple(to_type(answer))
     return replace(answer, advice=found)
 
 
@@ -59,7 +71,8 @@ def advised(answer: Analysis) -> Analysis:
 def advice_on(answer: Analysis) -> tuple[str, ...]:
     """A sentence with what to type, or none; some tenths of a second, where the answer is bad alone.
 
-    Each signal in turn has the other sign or another usual unit, with the design of the answer.
+    Each signal in turn has the other sign or another usual unit, then all of one unit have that, with the design of the
+    answer.
     """
     if (unit := _unit_of_time(answer)) is not None:
         return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
@@ -76,13 +89,15 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
             return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
     with work.limited(_OF_ANALYSIS * answer.found.allowance):
         found = list(_tried(answer)) or list(_turned(answer))
-    least = min((left for left, _, _ in found), default=0.0)
-    # A linear mechanism moves alike with the other sign of its input and of its sensor.
-    alike = [(said, typed) for left, said, typed in found if left <= _ALIKE * least][:2]
+    least = min((one.left for one in found), default=0.0)
+    # A linear mechanism moves alike in any unit, and with the other sign of its input and of its sensor.
+    alike = [one for one in found if one.left <= _ALIKE * least]
+    nearest = min((one.distance for one in alike), default=0.0)
+    alike = [one for one in alike if one.distance <= _ALIKE * nearest][:2]
     if not alike:
         return ()
-    other = [f" (or {typed.partition('=')[0]}: --columns {typed})" for _, typed in alike[1:]]
-    return (f"{alike[0][0]}: --columns {alike[0][1]}" + "".join(other),)
+    other = [f" (or {one.typed.partition('=')[0]}: --columns {one.typed})" for one in alike[1:]]
+    return (f"{alike[0].said}: --columns {alike[0].typed}" + "".join(other),)
 
 
 def _unit_of_time(answer: Analysis) -> str | None:
@@ -113,7 +128,7 @@ def _is_beyond_equations(answer: Analysis) -> bool:
     return neglected(answer.model, answer.recording.run) > 1
 
 
-def _turned(answer: Analysis) -> Iterator[tuple[float, str, str]]:
+def _turned(answer: Analysis) -> Iterator[_Mistake]:
     """The same of a drive with the other sign, which makes another mechanism of it: by designs of its own."""
     if max(answer.found.r2.values(), default=0.0) > _EXPLAINS:
         return
@@ -122,30 +137,45 @@ def _turned(answer: Analysis) -> Iterator[tuple[float, str, str]]:
             signals = {**answer.recording.signals, signal.name: -answer.recording.signals[signal.name]}
             turned = replace(answer.recording, signals=signals)
             again = attempted(partial(analysed, turned, answer.model, answer.weights))
-            if again is None or not again.identified or _distance(again, again.found.p) > _NEAR:
+            distance = np.inf if again is None else _distance(again, again.found.p)
+            if again is None or not again.identified or distance > _NEAR:
                 continue
             if min(again.found.r2.values()) > _EXPLAINS:
                 said, unit, _ = next(_mistakes(signal, signals[signal.name]))
-                yield again.found.chi2, said, f"{signal.name}={signal.name}:{unit}"
+                yield _Mistake(again.found.chi2, distance, said, f"{signal.name}={signal.name}:{unit}")
 
 
-def _tried(answer: Analysis) -> Iterator[tuple[float, str, str]]:
-    """Part of the residuals that is left by a mistake which explains the run, its sentence, and what to type."""
+def _tried(answer: Analysis) -> Iterator[_Mistake]:
+    """Mistakes that explain the run."""
     model, signals, before = answer.model, answer.recording.run, _score(answer)
     far = before is None or _distance(answer, before.p) > _FAR or _is_beyond_equations(answer)
-    for signal in sorted(answer.model.signals, key=lambda one: one.kind != "input"):
-        name = signal.name
-        for said, unit, most in _mistakes(signal, signals[name]):
-            scale = _scale(answer, name, unit)
-            # Noise is scaled with its signal: a signal that is small beside its noise fits any equations.
-            scaled = model if abs(scale) == 1 else _with_noise(model, name, abs(scale))
-            one = _score(answer, scaled, {**signals, name: scale * signals[name]})
-            if one is None or not one.known or _distance(answer, one.p) > _NEAR:
-                continue
-            left = one.chi2 / before.chi2 if before is not None else 0.0
-            implausible = far or (scale < 0 and before is not None and not before.known)
-            if left < (most if implausible else _PART):
-                yield left, said, f"{name}={name}:{unit}"
+    for names, said, unit, most in _every_mistake(answer):
+        typed = ",".join(f"{name}={name}:{unit}" for name in names)
+        scale = _scale(answer, names[0], unit)
+        # Noise is scaled with its signal: a signal that is small beside its noise fits any equations.
+        scaled = model if abs(scale) == 1 else _with_noise(model, names, abs(scale))
+        other = {**signals, **{name: scale * signals[name] for name in names}}
+        one = _score(answer, scaled, other)
+        distance = np.inf if one is None or not one.known else _distance(answer, one.p)
+        if one is None or distance > _NEAR:
+            continue
+        left = one.chi2 / before.chi2 if before is not None else 0.0
+        implausible = far or (scale < 0 and before is not None and not before.known)
+        if left < (most if implausible else _PART):
+            yield _Mistake(left, distance, said, typed)
+
+
+def _every_mistake(answer: Analysis) -> Iterator[tuple[list[str], str, str, float]]:
+    """Signals, what they seem to be, what to type behind each column, and the part of the residuals that may be left:
+    of each signal by itself, inputs first, then of all that have one unit."""
+    of_unit: dict[str, list[str]] = {}
+    for one in sorted(answer.model.signals, key=lambda one: one.kind != "input"):
+        of_unit.setdefault(one.unit, []).append(one.name)
+        for said, unit, most in _mistakes(one, answer.recording.run[one.name]):
+            yield [one.name], said, unit, most
+    for si, names in of_unit.items():
+        for unit in _UNITS.get(si, ()) if len(names) > 1 else ():
+            yield names, f"{listed(names)} seem to be in {unit}, not {si}", unit, _PART_OF_UNIT
 
 
 def _of_own(answer: Analysis) -> str | None:
@@ -183,12 +213,14 @@ def _scale(answer: Analysis, name: str, unit: str) -> float:
     return float(Columns.parse(f"{name}={name}:{unit}", channels_of(answer.model))[name].in_si(np.ones(1))[0])
 
 
-def _with_noise(model: CompiledModel, name: str, scale: float) -> CompiledModel:
-    """With the resolution and the noise of a signal so many times as large."""
-    own = model.signal(name)
-    noise = own.noise if own.resolution else scale * own.noise
-    other = replace(own, resolution=scale * own.resolution, noise=noise)
-    return replace(model, signals=tuple(other if one is own else one for one in model.signals))
+def _with_noise(model: CompiledModel, names: Sequence[str], scale: float) -> CompiledModel:
+    """With the resolution and the noise of signals so many times as large."""
+
+    def scaled(own: Signal) -> Signal:
+        noise = own.noise if own.resolution else scale * own.noise
+        return replace(own, resolution=scale * own.resolution, noise=noise)
+
+    return replace(model, signals=tuple(scaled(one) if one.name in names else one for one in model.signals))
 
 
 def _mistakes(signal: Signal, values: Float) -> Iterator[tuple[str, str, float]]:
@@ -197,5 +229,5 @@ def _mistakes(signal: Signal, values: Float) -> Iterator[tuple[str, str, float]]
     if signal.resolution and np.array_equal(values, np.rint(values)):
         typed = f"{signal.resolution:.9g}"
         yield f"{signal.name} seems to be in counts, not {signal.unit or 'the unit 1'}", typed, _PART_OF_UNIT
-    for unit, typed in _UNITS.get(signal.unit, {}).items():
-        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", typed, _PART_OF_UNIT
+    for unit in _UNITS.get(signal.unit, ()):
+        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", unit, _PART_OF_UNIT

@@ -29,6 +29,9 @@ _MEDIAN_OF, _FAR, _RUN, _NEIGHBOUR = 11, 10.0, 3, 0.2
 # An error code: so many samples in a row, so often where both neighbours agree, while no input moves by so much of its
 # range.
 _CODES, _FEWEST_CODES, _STEADY = 8, 4, 0.05
+# One or two values that no motion reaches: so many spans of eight of ten samples away from them, time and again, not in
+# the long runs of a pulse.
+_SPANS, _MOST_VALUES, _TENTH = 10.0, 2, 0.1
 MOST_FAR = 0.05  # of the samples: with more, the recording is refused
 
 
@@ -72,6 +75,21 @@ def _error_codes(x: Float, sd: float, steady: Mask) -> Mask:
     return far
 
 
+def _out_of_reach(x: Float) -> Mask:
+    """Samples of any signal that have a value far outside all others, such as -9999."""
+    none = np.zeros(len(x), np.bool_)
+    there = np.isfinite(x)
+    low, high = np.quantile(x[there], [_TENTH, 1 - _TENTH])
+    if low == high:
+        return none
+    outside = there & (np.maximum(low - x, x - high) > _SPANS * (high - low))
+    values, times = np.unique(x[outside], return_counts=True)
+    if not 0 < values.size <= _MOST_VALUES or times.min() < _FEWEST_CODES:
+        return none
+    first, end = stretches(outside)
+    return outside if np.median(end - first) <= _RUN else none
+
+
 def _steady(recording: Recording, model: CompiledModel) -> Mask:
     """Samples before which no input moves by much."""
     steady = np.ones(len(recording), np.bool_)
@@ -83,11 +101,12 @@ def _steady(recording: Recording, model: CompiledModel) -> Mask:
 
 
 def _without_far_samples(recording: Recording, signal: Signal, find: Callable[[Float], Mask]) -> tuple[Float, str]:
-    """A sensor's samples without those that are far from all about them, and a note on these."""
+    """A signal's samples without those that are far from all about them, and a note on these."""
     x = recording.signals[signal.name]
-    if len(x) <= _MEDIAN_OF:
+    there = np.isfinite(x)
+    if np.count_nonzero(there) <= _MEDIAN_OF:
         return x, ""
-    there, far = np.isfinite(x), find(x)
+    far = find(x) | _out_of_reach(x)
     count = int(np.count_nonzero(far))
     if not count:
         return x, ""
@@ -120,7 +139,8 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     sample is wild if its neighbours lie on a smooth curve within their noise and it is off this curve. Jumps and
     corners are kept, and so is a signal of which more than 0.1 % of the samples look wild. Far ones, such as the error
     codes of a sensor, are interpolated up to 5 % of the samples. Of a sensor whose rate alone is in the equations those
-    are error codes that have one value time and again; a sensor without any, which may jump, is kept as it is.
+    are error codes that have one value time and again; of any other signal, which may jump, those that no motion
+    reaches.
 
     Raises
     ------
@@ -133,16 +153,16 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     orders = {one.name: max(order_of(equation, [one.name]) for equation in model.equations) for one in model.signals}
     steady = _steady(recording, model)
     for one in model.signals:
+        find: Callable[[Float], Mask] = partial(far_from_median, sd=one.sd)
         if one.kind != "sensor" or one.driven or not orders[one.name]:
-            continue
-        find = partial(far_from_median, sd=one.sd)
-        if orders[one.name] < 2:
+            find = _out_of_reach
+        elif orders[one.name] < 2:
             find = partial(_error_codes, sd=one.sd, steady=steady)
         x, note = _without_far_samples(recording, one, find)
         if note:
             changed[one.name] = x
             notes.append(note)
-        if orders[one.name] < 2:
+        if one.kind != "sensor" or one.driven or orders[one.name] < 2:
             continue
         found = breaks(x, span, one.sd)
         for first, end in zip(*stretches(found), strict=True):

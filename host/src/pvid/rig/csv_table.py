@@ -461,7 +461,7 @@ class _Reader:
         """Rows without a time or without any number are none; overloads are missing."""
         order = list(self._places)
         for k, signal in enumerate(order):
-            for j in np.flatnonzero(np.isinf(values[k]) | np.isin(values[k], _NO_NUMBER)).tolist():
+            for j in np.flatnonzero(np.isinf(values[k]) | np.isin(np.abs(values[k]), _NO_NUMBER)).tolist():
                 word = "inf" if math.isinf(values[k, j]) else "9.9E37"
                 if word == "inf" or "E" in lines.line(j):  # not what `write_csv` writes
                     self._missing[signal][word] += int(is_row[j])
