@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from mechanism_kinds import KINDS
 
 from pvid.board.boards import BOARDS, BUILD, build, run
 from pvid.codegen.build import build as generate
@@ -69,7 +70,7 @@ def sources() -> Path:
     """A project with the generated folders of all mechanisms; in one place, because the boards' trees keep it."""
     folder = BUILD / "runs" / "generated"
     folder.mkdir(parents=True, exist_ok=True)
-    names = mechanisms.names()
+    names = KINDS
     for name in names:
         generate(GeneratedModel(mechanisms.compiled_of(name), "test"), folder / name)
     lists = LISTS.format(root=ROOT, names=" ".join(names), names_spaced=" ".join(names))
@@ -105,8 +106,8 @@ def test_all_results_have_the_bits_of_the_twins(
     build(board, tree, {"PVID_LEAVE_OUT": NEEDLESS}, source=sources)
     outcome = run(board, tree / "generated.elf", TIMEOUT_S)
     found = {word: int(number) for word, number in re.findall(r"^([a-z_0-9]+) ([0-9]+)$", outcome.text, re.MULTILINE)}
-    assert [found[f"{one}_faults"] for one in mechanisms.names()] == [0] * len(mechanisms.names()), outcome.text
-    for one in mechanisms.names():
+    assert [found[f"{one}_faults"] for one in KINDS] == [0] * len(KINDS), outcome.text
+    for one in KINDS:
         for core in ("f32", "q31"):
             count = found[f"{one}_{core}"] * 1024 / found["counts_per_1024"]
             record_property(f"{one}_{core}_instructions", round(count))

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from mechanism_kinds import KINDS
 
 from pvid.base.console import DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.compare.strong import StrongComparison
 from pvid.configuration.strong import strong_design
-from pvid.models import mechanisms
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
 from pvid.sim.simulated_run import simulation_of
@@ -65,7 +65,7 @@ def test_the_board_has_the_hash_of_the_twin(body: Path, target: str) -> None:
         assert host[2].strip() == core and host[6] == board[6] and len(host[6].strip()) == 8
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long) for one in mechanisms.names()])
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long) for one in KINDS])
 def test_every_mechanism_has_the_bits_of_its_twin(name: str) -> None:
     run = StrongComparison.of(simulation_of(name).model, recording(name))
     assert run.found.equal and run.found.ticks == TICKS

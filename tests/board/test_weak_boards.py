@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mechanism_kinds import KINDS
 from program import pvid
 
 from pvid.base.errors import PvidError
@@ -15,7 +16,6 @@ from pvid.board import mechanism_image_q31
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image import MISSING, build_mechanism_image, header, mechanism_run, native_hashes, twin_hashes
 from pvid.board.replay_image import REPORT_EVERY, play
-from pvid.models import mechanisms
 
 TIMEOUT_S = 300.0
 TICKS = 2500
@@ -33,8 +33,8 @@ def _long(board: str, name: str, core: str) -> Any:
         ("microbit", "dc_motor", "q31"),  # its short products have less room than those of other cores
         _long("virt-rv32imac", "battery_2rc", "f32"),
         *(_long(board, "two_link_arm", "f32") for board in ("mps3-an547", "virt-rv32imafc")),
-        *(_long("mps2-an386", name, "f32") for name in mechanisms.names() if name != "cart_pendulum"),
-        *(_long("mps2-an386", name, "q31") for name in mechanisms.names()),
+        *(_long("mps2-an386", name, "f32") for name in KINDS if name != "cart_pendulum"),
+        *(_long("mps2-an386", name, "q31") for name in KINDS),
     ],
 )
 def test_a_board_computes_the_bits_of_the_twin(board: str, name: str, core: str) -> None:

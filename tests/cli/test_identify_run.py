@@ -146,7 +146,7 @@ def test_settings_reach_the_model(motor: Path, shown: dict[str, Any]) -> None:
     ("arguments", "sentence"),
     [
         (("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is identified in float64"),
-        (("--model", "dc_moter"), "dc_moter: no such model; give a .py file or one of battery_2rc"),
+        (("--model", "dc_moter"), "dc_moter: no such model; give a .py file or one of ball_on_beam"),
     ],
 )
 def test_what_this_mechanism_cannot_do_is_refused(motor: Path, arguments: tuple[str, ...], sentence: str) -> None:

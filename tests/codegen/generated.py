@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 from described import CHAIN, MOTOR, ODDLY_NAMED
+from mechanism_kinds import KINDS
 
 from pvid.codegen.build import files_of
 from pvid.codegen.functions import Function, ModelFunctions, functions_of
@@ -21,7 +22,7 @@ from pvid.models import mechanisms
 
 VECTORS = 20_000
 BY_HAND = {one.name: one for one in (MOTOR, CHAIN, ODDLY_NAMED)}
-MODELS = (*BY_HAND, *mechanisms.names())
+MODELS = (*BY_HAND, *KINDS)
 WARNINGS = (
     *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wcast-align", "-Wcast-qual", "-Wconversion", "-Wvla"),
     *("-Wdouble-promotion", "-Wfloat-equal", "-Wmissing-prototypes", "-Wshadow", "-Wstrict-prototypes", "-Wundef"),

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from block_models import Q31InC
 from generated import WARNINGS, exactly, functions_by_name
+from mechanism_kinds import KINDS
 from printed_estimator import PrintedEstimator, printed_core
 
 from pvid.codegen import files_functions
@@ -19,7 +20,6 @@ from pvid.codegen.formats import bits_of
 from pvid.codegen.generated import GeneratedModel
 from pvid.core.native import Native
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources
-from pvid.models import mechanisms
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31
 
@@ -87,7 +87,7 @@ def config_of(fixed: FixedModel, size: Float) -> EstimatorConfigQ31:
     )
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", KINDS)
 def test_core_and_twin_have_the_same_integers_and_find_p(name: str, core: list[str], tmp_path: Path) -> None:
     fixed = fixed_model(functions_by_name(name))
     functions = fixed.functions

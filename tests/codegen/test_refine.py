@@ -14,6 +14,7 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 from conftest import ROOT
+from mechanism_kinds import KINDS
 
 from pvid.base.errors import PvidError
 from pvid.codegen import files_refine
@@ -24,7 +25,6 @@ from pvid.core.model_library import NATIVE, core_of, of_second_stage
 from pvid.core.sources import FOLDERS, INCLUDES, source
 from pvid.model import Model
 from pvid.model.signals import Jet, sgn
-from pvid.models import mechanisms
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.cores import FLOAT
@@ -41,7 +41,7 @@ WARNINGS = (
 )
 VECTORS, PRINTED = 200, 40  # PRINTED: of the twin
 # Names, and options of the refinement behind them.
-NAMES = (*mechanisms.names(), "kapitza slant", "kapitza dry_friction slant")
+NAMES = (*KINDS, "kapitza slant", "kapitza dry_friction slant")
 
 Float = npt.NDArray[np.float64]
 Given = dict[str, Any]

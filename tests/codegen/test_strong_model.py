@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 from generated import WARNINGS
+from mechanism_kinds import KINDS
 from struct_fields import set_field
 
 from pvid.base.errors import PvidError
@@ -91,7 +92,7 @@ def config_of(name: str, divider: int = 8, weights: Float32 | None = None) -> St
     return StrongModelConfig(simulation.rig.sample_rate, taps, bank.stride, plain, estimator)
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", KINDS)
 def test_the_printed_sums_are_those_of_the_papers_equations(name: str) -> None:
     """S = C^T M C and F = C^T (B - M theta) literally, in float64 on random inputs of three kinds of sizes."""
     strong, sums = strong_of(name), sums_of(name)
@@ -129,7 +130,7 @@ def test_the_printed_sums_are_those_of_the_papers_equations(name: str) -> None:
         assert abs(rss - distance) < 1e-8 * max(distance, np.abs(p[linear]) @ np.abs(projected))
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", KINDS)
 def test_residual_gradient_and_bound_are_those_of_the_rows(name: str) -> None:
     strong, sums = strong_of(name), sums_of(name)
     functions, random = strong.functions, np.random.default_rng(8)
@@ -152,7 +153,7 @@ def test_residual_gradient_and_bound_are_those_of_the_rows(name: str) -> None:
 
 
 @pytest.mark.parametrize("schedule", ["window in stages", "five points at every row"])
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", KINDS)
 def test_c_and_twin_have_the_same_bits(name: str, schedule: str) -> None:
     samples = recorded(name)[0][:TICKS].copy()
     samples[GAP, 0] = np.nan
@@ -168,9 +169,7 @@ def test_c_and_twin_have_the_same_bits(name: str, schedule: str) -> None:
     assert len(np.unique(want.p, axis=0)) > 10
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=() if one in BY_DAY else pytest.mark.night) for one in mechanisms.names()]
-)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=() if one in BY_DAY else pytest.mark.night) for one in KINDS])
 def test_the_printed_c_has_no_warning_and_its_header_is_cpp(name: str, tmp_path: Path) -> None:
     files = files_strong.files_of(strong_of(name), "test")
     for one, text in files.items():

@@ -6,6 +6,7 @@ import random
 
 import pytest
 import sympy as sp
+from mechanism_kinds import KINDS
 
 from pvid.codegen.functions import with_values
 from pvid.codegen.strong import strong_functions_of
@@ -17,7 +18,7 @@ from pvid.models import mechanisms
 
 # Kapitza's pendulum is multiplied by its denominators: test_strong_model.py compares it with the core's row. The cell's
 # charge is an integral since the start of the run.
-SAME = [name for name in mechanisms.names() if name not in ("kapitza", "battery_2rc")]
+SAME = [name for name in KINDS if name not in ("kapitza", "battery_2rc")]
 
 
 def residual(row: Row) -> sp.Expr:

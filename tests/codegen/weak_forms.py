@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
+from mechanism_kinds import KINDS
+
 from pvid.codegen import files_weak
 from pvid.codegen.weak import WeakFunctions, weak_functions_of, weak_model_of
 from pvid.codegen.weak_sizes import sizes_of_design
@@ -21,7 +23,7 @@ from pvid.oracle.weak.rows import WeakRows
 from pvid.settings.weak import WeakConfig, WeakModel
 from pvid.sim.simulated_run import RigSimulation
 
-NAMES = mechanisms.names()
+NAMES = KINDS
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
+from mechanism_kinds import KINDS
 from scipy.special import stdtrit
 
 from bench.lacking import (
@@ -27,7 +28,7 @@ from bench.lacking import (
 )
 from bench.mechanisms import design_of, start_of
 from bench.plants import PLANTS
-from pvid.models.mechanisms import compiled_of, names
+from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.identify import Identified, identify
 from pvid.oracle.weak.missing import _student
 from pvid.oracle.weak.terms import ACTS, Recorded
@@ -219,7 +220,7 @@ def test_signal_behind_a_lag_is_that_of_the_recursion(samples: float) -> None:
     np.testing.assert_allclose(recorded.under(lag, samples / rate), expected, rtol=1e-13)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", KINDS)
 def test_perfect_rig_lacks_nothing(name: str) -> None:
     found = imperfect(name)
     assert found.lacking is not None and not found.lacking.visible.any()

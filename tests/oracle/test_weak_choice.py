@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from mechanism_kinds import KINDS
 
 from pvid.base.errors import PvidError
 from pvid.model import Model, sgn
-from pvid.models.mechanisms import compiled_of, names
+from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak import choice
 from pvid.oracle.weak.choice import basis_of, lengths, made, power_of, ranked
@@ -173,7 +174,7 @@ def test_a_torque_that_is_a_law_of_the_angle_is_named_as_feedback() -> None:
     assert "feedback" not in [one.name for one in good.verdict.reasons]
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", KINDS)
 def test_what_a_changed_signal_leaves_alone_is_taken_from_the_run_before(name: str) -> None:
     """Columns of a run with one other signal: as of a model that has seen no run before."""
     simulation = simulation_of(name)

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from mechanism_kinds import KINDS
 
 import pvid
 from pvid.cli.main import commands
-from pvid.models.mechanisms import names, path_of
+from pvid.models.mechanisms import path_of
 from pvid.show.axis_limits import plain_ticks
 
 MOTOR = "dc_motor"
@@ -64,7 +65,7 @@ def test_plot_takes_a_model_file_and_the_refinement(motor: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in BY_DAY else pytest.mark.night) for name in names()]
+    "name", [pytest.param(name, marks=() if name in BY_DAY else pytest.mark.night) for name in KINDS]
 )
 def test_plot_draws_every_shipped_mechanism(name: str, tmp_path: Path) -> None:
     """The rig file beside the run names the mechanism; no option is needed."""

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanism_kinds import KINDS
 from weak_rig import Float32, WeakRig, assert_equals_the_twin, weak_rig
 
-from pvid.models import mechanisms
 from pvid.settings.enums import Law, Reason
 from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import WeakConfig
@@ -28,7 +28,7 @@ def updates(reason: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> int:
     return int(np.isin(reason, (Reason.UPDATED, Reason.MISFIT)).sum())
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", KINDS)
 def test_every_mechanism_has_the_bits_of_its_twin(name: str) -> None:
     """Gaps, a frozen stretch, errors of the equations, compensation; conditions that publish early."""
     rig = weak_rig(name)
@@ -215,7 +215,7 @@ def test_the_sums_of_a_run_outlive_a_gap() -> None:
 def random_case(seed: int) -> tuple[WeakRig, WeakConfig, Float32]:
     """A mechanism with random sizes, settings and limits, and a piece of its run with random faults."""
     random = np.random.default_rng(seed)
-    rig = weak_rig(str(random.choice(mechanisms.names())))
+    rig = weak_rig(str(random.choice(KINDS)))
     design, kinds = rig.config.design, rig.config.design.model.kinds
     functions = int(random.integers(4, design.functions + 1))
     hop = 8 * int(random.integers((functions + design.power) // 8 + 2, 20))

@@ -70,6 +70,7 @@ def bench_pages(names: tuple[str, ...], docs: Path) -> int:
         for done, name in enumerate(some, 1):
             mechanism_pages.write_page(docs, name)
             advance(done)
+    mechanism_pages.write_gallery(docs)
     return DONE
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,7 +22,7 @@ from pvid.cli.page_table import markdown
 from pvid.cli.results import Results
 from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
-from pvid.models.mechanisms import compiled_of, path_of
+from pvid.models.mechanisms import compiled_of, names, path_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import identify
@@ -105,6 +106,42 @@ def errors_of(results: Results, name: str) -> str:
     return markdown(results.header[1:], rows) if rows else ""
 
 
+def command_of(model: CompiledModel) -> str:
+    """What identifies a recording; a constant that must be stated has its usual value."""
+    needed = "".join(f" --set {one.name}={one.value:g}" for one in model.knowns if one.required)
+    return f"./tools/pvid identify recorded.csv --model {model.name}{needed}"
+
+
+def rig_of(name: str) -> str:
+    """The shipped rig in words."""
+    text = importlib.import_module(f"pvid.models.{name}.rig").__doc__
+    assert text is not None
+    return f"The rig: {text[0].lower()}{' '.join(text[1:].split())}"
+
+
+def gallery() -> str:
+    """The page of all mechanisms: what is measured of each, and what is found."""
+    rows: list[tuple[str, ...]] = []
+    for name in names():
+        model = compiled_of(name)
+        found = [*model.p_names, *(one.name for one in model.outputs)]
+        measured = ", ".join(one.name for one in model.signals)
+        rows.append((f"[{name}]({name}.md)", model.title, measured, ", ".join(found)))
+    return "\n".join(
+        [
+            "# Gallery",
+            "",
+            "Written by `./tools/pvid bench pages`: do not edit. "
+            f"{len(rows)} mechanisms are included. Each is one model file, with a simulated rig and a page: copy the "
+            "file to change it ([how](../models.md)). A recording whose columns have the names in the table needs no "
+            "`--model`; `./tools/pvid look recorded.csv` lists the mechanisms that any columns can be of.",
+            "",
+            markdown(("mechanism", "what it is", "recorded", "found"), rows),
+            "",
+        ]
+    )
+
+
 def page(name: str, example: Example, errors: str) -> str:
     """The text of a page.
 
@@ -126,13 +163,14 @@ def page(name: str, example: Example, errors: str) -> str:
             path.read_text(encoding="utf-8").rstrip(),
             "```",
             "",
-            f"`./tools/pvid model check {name}` prints:",
+            f"`{command_of(model)}` identifies a recording of it. `./tools/pvid model check {name}` prints:",
             "",
             "```text",
             check_report(model).rstrip(),
             "```",
             "",
-            f"A simulated run of its rig (seed {SEED}), and the motion that the parameters identified from it give, "
+            f"{rig_of(name)} A simulated run (seed {SEED}), and the motion that the parameters identified from it "
+            "give, "
             f"from the same start and drive; R^2 over the whole run: {fits}.",
             "",
             f"![Measured and simulated signals](../images/mechanisms/{name}.png)",
@@ -167,3 +205,8 @@ def write_page(docs: Path, name: str) -> None:
         picture(example, docs / "images" / "mechanisms" / f"{name}.png")
     errors = errors_of(results_of(ERRORS), name)
     write_whole(docs / "mechanisms" / f"{name}.md", page(name, example, errors), freely=True)
+
+
+def write_gallery(docs: Path) -> None:
+    """The page of all."""
+    write_whole(docs / "mechanisms" / "gallery.md", gallery(), freely=True)

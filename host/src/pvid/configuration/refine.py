@@ -219,9 +219,9 @@ def _fastest_hz(made: RefineFunctions, r: Float, states: Sequence[State]) -> flo
 
 
 def _slow_s(made: RefineFunctions, r: Float) -> float:
-    """Two periods of the slowest oscillation at rest; inf: there is none."""
-    at_rest = _at_rest(made)
-    rates = np.abs(np.linalg.eigvals(_slopes(made, r, *at_rest)).imag)
+    """Two periods of the slowest oscillation at rest; inf: there is none, or no derivative, as of an empty tank."""
+    slopes = _slopes(made, r, *_at_rest(made))
+    rates = np.abs(np.linalg.eigvals(slopes).imag) if np.isfinite(slopes).all() else np.zeros(1)
     return 4 * math.pi / float(rates[rates > 0].min()) if rates.any() else math.inf
 
 

@@ -16,6 +16,7 @@ from pvid.base.errors import PvidError
 from pvid.base.units import Scale, scale_to, spelled
 from pvid.identification.wild_samples import MOST_FAR, far_from_median
 from pvid.models.mechanisms import described
+from pvid.models.registry import most_specific
 from pvid.models.registry import names as shipped_names
 from pvid.rig.columns import TIME, Channel, Column, Columns, MissingColumnError, typed, unit_in, unit_in_brackets
 from pvid.rig.gaps import at_its_ends, holds_changes
@@ -321,14 +322,14 @@ class Proposal:
     mechanism, title : its name, and what it is
     columns : text of --columns; "": the columns have the names of the signals
     constants : that its user must state, each with its unit
-    used : columns
+    used : names of columns
     """
 
     mechanism: str
     title: str
     columns: str
     constants: tuple[tuple[str, str], ...]
-    used: int
+    used: frozenset[str]
 
     def command(self, file: str) -> str:
         """What to type next; a constant that must be stated is 0.00 there."""
@@ -339,11 +340,17 @@ class Proposal:
 
 
 def proposals(survey: Survey) -> tuple[Proposal, ...]:
-    """The shipped mechanisms with a column for each signal, by names and units; those that use most columns first."""
+    """The shipped mechanisms with a column for each signal, by names and units; those that use most columns first.
+
+    One that uses a part of another's columns is left out: the columns of a driven motor are also those of one that runs
+    out.
+    """
     stated = {one.name: one.unit for one in survey.facts if one.unit}
     measured = [one.name for one in survey.facts if one.low < one.high and not one.is_even]
-    found = [one for name in shipped_names() if (one := _proposal(name, survey, measured, stated)) is not None]
-    return tuple(sorted(found, key=lambda one: (bool(one.columns), -one.used)))
+    all_of = [one for name in shipped_names() if (one := _proposal(name, survey, measured, stated)) is not None]
+    specific = most_specific({one.mechanism: one.used for one in all_of})
+    found = [one for one in all_of if one.mechanism in specific]
+    return tuple(sorted(found, key=lambda one: (bool(one.columns), -len(one.used))))
 
 
 def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: Mapping[str, str]) -> Proposal | None:
@@ -366,7 +373,9 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
             parts.append(f"{signal}={written}" + ("" if in_si or unit_in_brackets(name) else f":{unit}"))
     constants = tuple((one.name, one.unit) for one in description.knowns if one.required)
     columns = ",".join(parts)
-    return Proposal(mechanism, description.title, shlex.quote(columns) if columns else "", constants, len(own))
+    return Proposal(
+        mechanism, description.title, shlex.quote(columns) if columns else "", constants, frozenset(own.values())
+    )
 
 
 def _fits(unit: str | None, si: str) -> bool:

@@ -27,6 +27,8 @@ WINDOWS = 4  # in a block
 SHORTEST = 30  # samples of a block
 _BLOCKS = 6  # at least
 _PASSES = 6  # of the search for the starts
+_TRIED = 8  # blocks in which the growth of an error of the start is computed
+_GROWN = 20.0  # by which it grows in the second half of a block at most: twice the cube of 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +117,28 @@ class Motion:
         return Problem(kernel, replace(measured, stretches=chosen, sd=scaled), self.problem.budget)
 
     def block(self, window_s: float, parts: int = 1) -> int:
-        """Samples of a block, of this window of the weak form; at most those of each of so many parts of the run."""
+        """Samples of a block, of this window of the weak form; at most those of each of so many parts of the run.
+
+        Fewer where the motion is unstable, as that of a ball which a controller holds on a beam: an error of the start
+        grows there beyond all motion. A motion that integrates an error three times has a growth of 8.
+        """
         rate, longest = self.problem.measured.rate, self.problem.longest
-        return int(np.clip(round(WINDOWS * window_s * rate), SHORTEST, max(SHORTEST + 1, longest // parts)))
+        most = int(np.clip(round(WINDOWS * window_s * rate), SHORTEST, max(SHORTEST + 1, longest // parts)))
+        samples = SHORTEST
+        while samples < most and self._growth(min(2 * samples, most)) < _GROWN:
+            samples = min(2 * samples, most)
+        return samples
+
+    def _growth(self, samples: int) -> float:
+        """The factor by which an error of the start grows in the second half of usual blocks of so many samples."""
+        problem = self.problem
+        cut = problem.cut(samples)
+        cut = Cut(cut.first[:: -(-len(cut.first) // _TRIED)].copy(), cut.samples)
+        found = problem.block(self._r, cut, problem.first_starts(cut, self._r), problem.used(cut), move=False)
+        if found is None:
+            return np.inf
+        early, late = (np.abs(part).max(axis=(1, 2)) for part in np.array_split(found.jacobian, 2, axis=1))
+        return float(np.median(np.where(early > 0, late / np.where(early > 0, early, 1.0), 1.0).max(axis=1)))
 
     def simulated(self, r: Float, problem: Problem, samples: int, most: int | None = None) -> tuple[Cut, Float]:
         """Blocks and readings in them [blocks, samples, sensors], from starts that fit the measured ones.

@@ -55,8 +55,11 @@ def far_from_median(x: Float, sd: float) -> Mask:
 
 def _error_codes(x: Float, sd: float, steady: Mask) -> Mask:
     """Samples of a sensor that cannot jump that have, alone or in runs of a few, one value time and again, off both
-    neighbours in the same direction: at first where these agree and the inputs are steady, then wherever it stands."""
+    neighbours in the same direction: at first where these agree and the inputs are steady, then wherever it stands. A
+    peak of fast oscillations is off by less than the usual motion from sample to sample."""
     far = np.zeros(len(x), np.bool_)
+    moves = np.abs(np.diff(x))
+    limit = max(2 * _FAR * sd, 2 * float(np.nanmedian(moves)) if np.isfinite(moves).any() else 0.0)
     for run in range(1, _CODES + 1):
         first = np.arange(1, len(x) - run)
         inside = np.array([x[first + k] for k in range(run)])
@@ -64,7 +67,7 @@ def _error_codes(x: Float, sd: float, steady: Mask) -> Mask:
         same = (inside == inside[0]).all(axis=0) & (np.sign(before) == np.sign(after))
         off = np.minimum(np.abs(before), np.abs(after))
         with np.errstate(invalid="ignore"):
-            alone = same & (off > 2 * _FAR * sd)
+            alone = same & (off > limit)
             clear = alone & (np.abs(before - after) < _NEIGHBOUR * off)
         clear &= np.lib.stride_tricks.sliding_window_view(steady, run + 2).all(axis=1)
         values, times = np.unique(inside[0][clear], return_counts=True)

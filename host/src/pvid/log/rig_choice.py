@@ -16,7 +16,7 @@ from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log, named_in
 from pvid.model.description import Model
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import described as description_of
-from pvid.models.registry import Mechanism, asked_for, is_named, names, shipped
+from pvid.models.registry import Mechanism, asked_for, is_named, most_specific, names, shipped
 from pvid.rig.columns import Columns, MissingColumnError, parsed
 from pvid.rig.former import translated
 from pvid.rig.mechanism_file import MechanismRig, channels_of, parsed_file, rig_path_of, with_settings
@@ -111,7 +111,8 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
     Raises
     ------
     PvidError
-        Where none has, or several have.
+        Where none has, or several have. One whose signals are a part of another's is not counted: a file with the
+        columns of a driven motor is of that, not of a motor that runs out.
     """
     if run_path is not None and run_path.suffix == LOG_SUFFIX:
         return mechanism_of_log(run_path).name
@@ -119,8 +120,8 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
         read = partial(read_recording, run_path, None)
     if read is None:
         raise PvidError(f"no mechanism is named: use --model, with {listed(names(), 'or')}, or a model file")
-    found: list[str] = []
-    wrong: list[PvidError] = []
+    columns_of: dict[str, set[str]] = {}
+    wrong: dict[str, PvidError] = {}
     for name in names():
         try:
             wanted = parsed(columns, channels_of(description_of(name)))
@@ -131,10 +132,11 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
         except MissingColumnError:
             continue
         except PvidError as error:  # it has the columns, and something else is wrong
-            wrong.append(error)
-        found.append(name)
-    if wrong and len(wrong) == len(found) > 1:  # of the file, whatever its mechanism is
-        raise wrong[0]
+            wrong[name] = error
+        columns_of[name] = {one.name for one in description_of(name).signals}
+    found = most_specific(columns_of)
+    if len(found) > 1 and all(name in wrong for name in found):  # of the file, whatever its mechanism is
+        raise wrong[found[0]]
     if len(found) == 1:
         return found[0]
     what = "the data" if run_path is None else str(run_path)

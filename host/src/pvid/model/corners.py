@@ -23,7 +23,7 @@ import sympy as sp
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.factor import factor, parts_of
 from pvid.model.signals import TIME, Integral, Jet, jets, order_of
-from pvid.model.terms import added, merged, terms_of, varies
+from pvid.model.terms import added, is_opaque, merged, terms_of, varies
 
 # A coefficient with more operations than this would burden every row for a correction that smooth inputs do not need.
 _LONGEST = 12
@@ -194,5 +194,5 @@ def _added(parts: Mapping[int, sp.Expr], sensor: str, what: sp.Expr) -> dict[int
         own = [term for term in terms_of(psi) if jet in jets(term) and not term.has(Integral, TIME)]
         plain = [term for term in own if not any(one.of == sensor and one.order for one in jets(term))]
         gains = [sp.diff(term, jet) for term in plain]
-        out[order] = added(gain for gain in gains if not gain.has(sp.Function)) * what
+        out[order] = added(gain for gain in gains if not is_opaque(gain) and not gain.has(sp.Function)) * what
     return out

@@ -15,7 +15,7 @@ from sympy.polys.matrices import DomainMatrix
 from pvid.model.compiled import Part, Row
 from pvid.model.refusal import ModelError
 from pvid.model.signals import Jet, sgn, total_derivative
-from pvid.model.terms import ONE, ZERO, merged, split, terms_of, times
+from pvid.model.terms import ONE, ZERO, merged, roots_of, split, terms_of, times
 from pvid.model.zero import dependent
 
 
@@ -26,8 +26,8 @@ class _Channel:
 
     @property
     def rate(self) -> sp.Expr:
-        """D^order[base] in jets; sgn(..) and |..| stand as signals of their own."""
-        atoms = {one: Jet(f"_{one}") for one in self.base.atoms(sgn, sp.Abs)}
+        """D^order[base] in jets; sgn(..), |..| and roots stand as signals of their own."""
+        atoms = {one: Jet(f"_{one}") for one in (*self.base.atoms(sgn, sp.Abs), *roots_of(self.base))}
         return total_derivative(self.base.xreplace(atoms), self.order)
 
 

@@ -10,7 +10,7 @@ import sympy as sp
 from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import Integral, jets, sgn
-from pvid.model.terms import varies
+from pvid.model.terms import roots_of, varies
 
 _FUNCTIONS = (sp.sin, sp.cos, sp.Abs, sgn, Integral)
 
@@ -56,8 +56,9 @@ def normal_form(expression: sp.Expr, p: Collection[sp.Symbol]) -> sp.Expr:
         numerator, _ = sp.fraction(sp.together(whole))
         whole = sp.expand(numerator)
     for one in whole.atoms(sp.Pow):
-        if one.base.free_symbols and not one.exp.is_Integer:
-            raise ModelError(f"{readable(one)} is no whole power: only those of signals and unknowns are supported")
+        if one.base.free_symbols & set(p) | jets(one.base) and not one.exp.is_Integer and one not in roots_of(whole):
+            only = "only those of signals and unknowns are supported, and square roots of signals"
+            raise ModelError(f"{readable(one)} is no whole power: {only}")
     return whole
 
 
@@ -74,7 +75,7 @@ def _check_functions(whole: sp.Expr, p: Collection[sp.Symbol]) -> None:
             raise ModelError(f"{readable(one)} is not supported: make it the unknown itself, or declare it as known")
         if varies(one) and not isinstance(one, _FUNCTIONS):
             raise ModelError(
-                f"{type(one).__name__}(..) of a signal is not supported: sin, cos, sgn, abs and rational functions are"
+                f"{type(one).__name__}(..) of a signal is not supported: sin, cos, sgn, abs, sqrt and rational ones are"
             )
     if whole.has(sp.Derivative, sp.Integral, sp.Piecewise):
         raise ModelError("derivatives are written as signal.d(n), and no cases are possible")

@@ -1,4 +1,4 @@
-"""sgn(..) and |..| as auxiliary signals, so that operators can act on them without differentiating."""
+"""sgn(..), |..| and roots as auxiliary signals, so that operators can act on them without differentiating."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pvid.model.compiled import Part, Row
 from pvid.model.lower import OPAQUE
 from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
-from pvid.model.signals import Jet, jets, sgn
-from pvid.model.terms import added, product, terms_of
+from pvid.model.signals import Jet, jets
+from pvid.model.terms import added, is_opaque, product, terms_of
 
 
 class Opaque:
@@ -23,12 +23,12 @@ class Opaque:
         self.stands_for: dict[Jet, sp.Expr] = {}
 
     def hide(self, expression: sp.Expr) -> sp.Expr:
-        """Each term's factor of measured signals that contains sgn or |..| becomes one jet.
+        """Each term's factor of measured signals that contains sgn, |..| or a root becomes one jet.
 
         Raises
         ------
         ModelError
-            Where sgn or |..| takes a coordinate that is not measured.
+            Where one of these takes a coordinate that is not measured.
         """
         return added(self._term(term) for term in terms_of(expression))
 
@@ -45,21 +45,21 @@ class Opaque:
         return {m: sp.expand(psi.xreplace(self.stands_for)) for m, psi in part.items()}
 
     def _term(self, term: sp.Expr) -> sp.Expr:
-        if not term.has(sgn, sp.Abs):
+        if not is_opaque(term):
             return term
         inside: list[sp.Expr] = []
         outside: list[sp.Expr] = []
         for factor in sp.Mul.make_args(term):
             own = jets(factor)
             unmeasured = {jet.of for jet in own} & self.hidden
-            if unmeasured and factor.has(sgn, sp.Abs):
+            if unmeasured and is_opaque(factor):
                 names = " and ".join(sorted(unmeasured))
                 raise ModelError(
                     f"{names} cannot be eliminated: {readable(factor)} is not linear in it; a sensor for "
                     f"{names} would help"
                 )
             (inside if own and not unmeasured and not factor.free_symbols & self.p else outside).append(factor)
-        if not any(factor.has(sgn, sp.Abs) for factor in inside):
+        if not any(map(is_opaque, inside)):
             return term
         return product(outside) * self._jet(product(inside))
 

@@ -15,6 +15,7 @@ import sympy as sp
 from pvid.model.compiled import CompiledModel, Part, Row
 from pvid.model.gradient import rank
 from pvid.model.signals import MAX_ORDER, TIME, Integral, Jet, jets, order_of, sgn, total_derivative
+from pvid.model.terms import roots_of
 from pvid.model.zero import RationalPoint, Sampler
 
 _ROUNDS = 8  # of insertion: a derivative of what is inserted may contain a jet that follows again
@@ -147,9 +148,9 @@ def _has_long_number(term: sp.Expr) -> bool:
 
 
 def _rate(part: Part) -> sp.Expr:
-    """sum D^m[psi]; sgn(..) and |..| stand as signals of their own."""
+    """sum D^m[psi]; sgn(..), |..| and roots stand as signals of their own."""
     total = sp.Integer(0)
     for m, psi in part.items():
-        atoms = {one: Jet(f"_{one}") for one in psi.atoms(sgn, sp.Abs)}
+        atoms = {one: Jet(f"_{one}") for one in (*psi.atoms(sgn, sp.Abs), *roots_of(psi))}
         total += total_derivative(psi.xreplace(atoms), m)
     return total

@@ -10,7 +10,7 @@ import sympy as sp
 
 from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
-from pvid.model.signals import TIME, Integral, Jet
+from pvid.model.signals import TIME, Integral, Jet, sgn
 
 ZERO, ONE = sp.Integer(0), sp.Integer(1)
 
@@ -34,6 +34,16 @@ def terms_of(expression: sp.Expr) -> tuple[sp.Expr, ...]:
 def varies(expression: sp.Expr) -> bool:
     """Whether it contains a signal, the time or a running integral."""
     return bool(expression.atoms(Jet, Integral)) or expression.has(TIME)
+
+
+def roots_of(expression: sp.Expr) -> set[sp.Pow]:
+    """Square roots of signals, and other powers of a half."""
+    return {one for one in expression.atoms(sp.Pow) if one.exp.is_Rational and one.exp.q == 2 and varies(one.base)}
+
+
+def is_opaque(expression: sp.Expr) -> bool:
+    """Whether it contains sgn(..), |..| or a root of a signal, of which rows take no derivative."""
+    return bool(expression.has(sgn, sp.Abs) or roots_of(expression))
 
 
 def split(term: sp.Expr, p: Iterable[sp.Symbol]) -> tuple[sp.Expr, sp.Expr, sp.Expr]:

@@ -8,6 +8,7 @@ file, a log) contain `str` alone; `asked_for` alone makes a `Path`, of what the 
 from __future__ import annotations
 
 import os
+from collections.abc import Collection, Mapping
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -33,6 +34,12 @@ def asked_for(model: str | os.PathLike[str] | Model) -> Mechanism:
     if isinstance(model, str | os.PathLike):
         return str(model) if str(model) in names() else Path(model)
     return model
+
+
+def most_specific(columns: Mapping[str, Collection[str]]) -> tuple[str, ...]:
+    """Of mechanisms, each with the columns of a file that it uses: those whose columns are not a part of another's."""
+    sets = {name: frozenset(used) for name, used in columns.items()}
+    return tuple(name for name, used in sets.items() if not any(used < other for other in sets.values()))
 
 
 def is_named(asked: Mechanism, name: str) -> bool:

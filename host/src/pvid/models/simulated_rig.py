@@ -12,19 +12,21 @@ from pvid.models.drive import Drive, Sines
 
 @dataclass(frozen=True)
 class Servo:
-    """An input that follows from a reference: kp (reference - coordinate) - kd coordinate'.
+    """An input that follows from a reference: kp (reference - coordinate) - kd coordinate' - what other states give.
 
     Attributes
     ----------
     coordinate : name of the signal
     reference : of the coordinate
     kp, kd : gains, in the input's unit per unit of the coordinate and of its rate
+    others : gains of other states, as in r (a position) or r_1 (its rate)
     """
 
     coordinate: str
     reference: Sines
     kp: float
     kd: float
+    others: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

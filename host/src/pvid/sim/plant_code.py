@@ -10,6 +10,8 @@ import sympy as sp
 
 from pvid.sim.motion import Motion
 
+_DIGITS = 20  # of pi and the like
+
 
 def plant_code(motion: Motion) -> str:
     """C99 that exports plant_run; see integrator.c for its arguments."""
@@ -53,7 +55,8 @@ def _function(name: str, out: str, assignments: Sequence[tuple[str, sp.Expr]], n
     )
 
     def text(value: sp.Expr) -> str:
-        return str(sp.ccode(value.xreplace(names)))
+        numbers = {one: one.evalf(_DIGITS) for one in value.atoms(sp.NumberSymbol)}
+        return str(sp.ccode(value.xreplace({**names, **numbers}), math_macros={}))  # C99 has no M_PI, no M_SQRT2
 
     lines = [f"  const double {mark} = {text(value)};" for mark, value in shared]
     lines += [f"  {place} = {text(value)};" for (place, _), value in zip(assignments, reduced, strict=True)]

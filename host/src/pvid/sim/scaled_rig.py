@@ -146,9 +146,9 @@ def _scaled(drive: Drive | Servo, gain: float, faster: float) -> Drive | Servo:
     if not isinstance(drive, Servo):
         return Scaled(drive, gain, faster)
     tones = tuple((size, hz * faster, phase) for size, hz, phase in drive.reference.tones)
-    return replace(
-        drive, reference=replace(drive.reference, tones=tones), kp=gain * drive.kp, kd=gain / faster * drive.kd
-    )
+    reference = replace(drive.reference, tones=tones)
+    others = {name: gain / faster ** name.endswith("_1") * one for name, one in drive.others.items()}
+    return replace(drive, reference=reference, kp=gain * drive.kp, kd=gain / faster * drive.kd, others=others)
 
 
 def _grown(simulation: RigSimulation) -> float:

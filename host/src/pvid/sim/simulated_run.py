@@ -186,14 +186,17 @@ class RigSimulation:
         for name, one in servos.items():
             place = self.plant.motion.state(one.coordinate)
             rate = self.plant.motion.state(f"{one.coordinate}_1") if one.kd else place
-            laws.append((name, one, place, rate, one.reference.values(t)))
+            others = [(self.plant.motion.state(state), gain) for state, gain in one.others.items()]
+            laws.append((name, one, place, rate, others, one.reference.values(t)))
         rest = {name: one.values(t) for name, one in self.rig.drive.items() if not isinstance(one, Servo)}
 
         def control(now: float, state: Float) -> dict[str, float]:
             k = round(now * self.rig.sample_rate)
             given: dict[str, Any] = {
-                name: one.kp * (reference[k] - state[place]) - one.kd * state[rate]
-                for name, one, place, rate, reference in laws
+                name: one.kp * (reference[k] - state[place])
+                - one.kd * state[rate]
+                - sum(gain * state[other] for other, gain in others)
+                for name, one, place, rate, others, reference in laws
             }
             return given | {name: float(values[k]) for name, values in rest.items()}
 

@@ -78,8 +78,16 @@ class RefinedKernel:
         return np.array(r + [known.get(name, 1.0) for name in self.made.settings])
 
     def slopes_at_rest(self, r: Float) -> Float:
-        """dx'/dx [states, states] at a state and inputs of 0."""
-        return self.slopes(r, np.zeros(self.states), np.zeros(len(self.made.inputs)))
+        """dx'/dx [states, states] at a state and inputs of 0; where there is none, as of an empty tank, at half of what
+        the sensors reach."""
+        u = np.zeros(len(self.made.inputs))
+        reach = {one.name: one.reach for one in self.made.model.signals}
+        half = np.zeros(self.states)
+        of_coordinates = np.array([reach.get(name, 2.0) / 2 for name in self.made.coordinates])
+        half[: len(of_coordinates)] = np.where(np.isfinite(of_coordinates), of_coordinates, 1.0)
+        with np.errstate(all="ignore"):
+            found = self.slopes(r, np.zeros(self.states), u)
+            return found if np.isfinite(found).all() else self.slopes(r, half, u)
 
     def without_signs(self, r: Float) -> Float:
         """r with signs so wide that they do nothing."""

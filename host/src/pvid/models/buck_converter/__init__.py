@@ -1,0 +1,1 @@
+"""A synchronous buck converter."""

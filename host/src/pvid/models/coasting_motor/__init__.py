@@ -1,0 +1,1 @@
+"""A motor that runs out."""

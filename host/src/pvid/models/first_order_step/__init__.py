@@ -1,0 +1,1 @@
+"""A process of first order with a dead time."""

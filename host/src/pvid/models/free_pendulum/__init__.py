@@ -1,0 +1,1 @@
+"""A pendulum that swings freely."""

@@ -1,0 +1,1 @@
+"""A heated body in air."""

@@ -1,0 +1,1 @@
+"""A mass on a spring, driven by a known force."""

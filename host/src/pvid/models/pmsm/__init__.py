@@ -1,0 +1,1 @@
+"""A permanent-magnet synchronous motor in d-q coordinates."""

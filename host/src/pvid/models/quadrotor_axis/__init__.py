@@ -1,0 +1,1 @@
+"""The roll axis of a quadrotor on a stand."""

@@ -1,0 +1,1 @@
+"""Steps of voltage at a resistor and a capacitor."""

@@ -1,0 +1,1 @@
+"""A tank with an outlet."""
