@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.board.boards import BOARDS, BUILD, build, run
 from pvid.codegen.build import build as generate
 from pvid.codegen.generated import GeneratedModel

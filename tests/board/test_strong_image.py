@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.base.console import DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands

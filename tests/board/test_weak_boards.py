@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mechanism_kinds import KINDS
 from program import pvid
 
+from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image_q31
 from pvid.board.boards import BOARDS

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 from described import CHAIN, MOTOR, ODDLY_NAMED
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.codegen.build import files_of
 from pvid.codegen.functions import Function, ModelFunctions, functions_of
 from pvid.codegen.generated import GeneratedModel

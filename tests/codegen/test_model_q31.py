@@ -11,9 +11,9 @@ import numpy.typing as npt
 import pytest
 from block_models import Q31InC
 from generated import WARNINGS, exactly, functions_by_name
-from mechanism_kinds import KINDS
 from printed_estimator import PrintedEstimator, printed_core
 
+from bench.kinds import KINDS
 from pvid.codegen import files_functions
 from pvid.codegen.fixed_model import FixedModel, fixed_model
 from pvid.codegen.formats import bits_of

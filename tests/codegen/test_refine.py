@@ -14,8 +14,8 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 from conftest import ROOT
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.codegen import files_refine
 from pvid.codegen.operations import Operation

@@ -12,9 +12,9 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 from generated import WARNINGS
-from mechanism_kinds import KINDS
 from struct_fields import set_field
 
+from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.codegen import files_strong
 from pvid.codegen.operations import Program, evaluated

@@ -6,8 +6,8 @@ import random
 
 import pytest
 import sympy as sp
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.codegen.functions import with_values
 from pvid.codegen.strong import strong_functions_of
 from pvid.model import Model, sgn

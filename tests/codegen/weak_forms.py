@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from mechanism_kinds import KINDS
-
+from bench.kinds import KINDS
 from pvid.codegen import files_weak
 from pvid.codegen.weak import WeakFunctions, weak_functions_of, weak_model_of
 from pvid.codegen.weak_sizes import sizes_of_design

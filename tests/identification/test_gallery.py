@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanism_kinds import KINDS
 from program import pvid
 
+from bench.kinds import KINDS
 from pvid.identification.survey import proposals, surveyed
 from pvid.identification.validation import Motion
 from pvid.identification.wild_samples import without_wild_samples

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.codegen.build import files_of
 from pvid.codegen.generated import GeneratedModel

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.model.compiled import Row
 from pvid.model.signals import Jet, jets, sgn, total_derivative
 from pvid.model.strong import strong_form

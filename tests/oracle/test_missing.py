@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
-from mechanism_kinds import KINDS
 from scipy.special import stdtrit
 
+from bench.kinds import KINDS
 from bench.lacking import (
     EFFECTS,
     OF_TABLE,

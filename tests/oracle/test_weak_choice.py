@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from mechanism_kinds import KINDS
 
+from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.model import Model, sgn
 from pvid.models.mechanisms import compiled_of

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from mechanism_kinds import KINDS
 
 import pvid
+from bench.kinds import KINDS
 from pvid.cli.main import commands
 from pvid.models.mechanisms import path_of
 from pvid.show.axis_limits import plain_ticks

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanism_kinds import KINDS
 from weak_rig import Float32, WeakRig, assert_equals_the_twin, weak_rig
 
+from bench.kinds import KINDS
 from pvid.settings.enums import Law, Reason
 from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import WeakConfig

@@ -33,16 +33,17 @@ from types import FrameType
 import click
 import numpy as np
 
+from bench.kinds import KINDS as KINDS_OF_MECHANISM
 from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.cli import main as cli
 from pvid.model.compiled import CompiledModel
-from pvid.models.mechanisms import compiled_of, names
+from pvid.models.mechanisms import compiled_of
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Recording, write_recording
 from pvid.sim.simulated_run import simulation_of, write_simulated_run
 
 KINDS = ("rigs", "runs", "commands")
-MECHANISMS = tuple(names())
+MECHANISMS = KINDS_OF_MECHANISM
 HEADER = (
     "attacked with",
     "mutants",

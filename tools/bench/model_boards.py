@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
@@ -15,10 +16,9 @@ from pvid.board.mechanism_image import twin_hashes as float_hashes
 from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
 from pvid.board.mechanism_image_q31 import twin_hashes as fixed_hashes
 from pvid.board.replay_image import ReplayReport, play
-from pvid.models import mechanisms
 from pvid.settings.enums import Core
 
-HEADER = ("board", "core", *mechanisms.names(), "bits")
+HEADER = ("board", "core", *KINDS, "bits")
 CORES: tuple[Core, ...] = ("f32", "q31")
 # One of each instruction set, with a floating point unit and without one.
 USUAL = (
@@ -74,7 +74,7 @@ def reason_for_no_figure(error: PvidError) -> str:
     raise error
 
 
-def row_of(board: Board, core: Core, names: tuple[str, ...] = tuple(mechanisms.names())) -> tuple[str, ...]:
+def row_of(board: Board, core: Core, names: tuple[str, ...] = KINDS) -> tuple[str, ...]:
     """Mean instructions of a tick (an AVR: clock cycles) of each mechanism, and whether all bits are the twin's.
 
     Raises

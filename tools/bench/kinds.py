@@ -1,4 +1,4 @@
-"""The shipped mechanisms that a test takes which computes for seconds; a light one takes all, `names()`."""
+"""The shipped mechanisms of tables and tests that compute for seconds each; a light test takes all, `names()`."""
 
 KINDS = (
     "battery_2rc",  # an integral, hidden coordinates of order one, an output by an algebraic equation; 1 Hz
