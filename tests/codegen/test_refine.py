@@ -303,6 +303,19 @@ def evaluated(made: RefineFunctions, name: str, given: Given) -> list[Float]:
     return list(made.functions[name].values(**given).values())
 
 
+def test_a_sign_may_have_constants_in_its_argument() -> None:
+    """sgn((v + s w) / r) of a wheel: with the values of r and s it stands with the other sign, or without a factor."""
+    model = Model("wheel")
+    tau, v, w = model.input("tau", "N*m", hold="zoh"), model.sensor("v", "m/s", 1e-3), model.sensor("w", "rad/s", 1e-3)
+    r, s = model.known("r", "m", 0.05), model.known("s", "m", 0.35)
+    m, jw, tc = model.unknown("m", "kg", 9.0), model.unknown("Jw", "kg*m^2", 1.0), model.unknown("Tc", "N*m", 0.1)
+    turn = (s * w - v) / r
+    model.equation(m * v.d() + (tau - tc * sgn(turn)) / r)
+    model.equation(jw * w.d() - (tau - tc * sgn(turn)) * s / r)
+    functions = refine_functions(model.compiled("wheel"))
+    assert [one.sign for one in functions.parameters if one.sign] == ["(-v + w*s)/r"]
+
+
 def test_the_pendulums_are_as_lean_as_those_by_hand() -> None:
     """The prototype's C has 41 operations in the accelerations, 122 with all derivatives."""
     made = functions("kapitza")

@@ -165,6 +165,12 @@ def signs_of(model: CompiledModel) -> tuple[sp.Expr, ...]:
     return tuple(one.args[0] for one in sorted(found, key=str))
 
 
+def _argument_with_values(model: CompiledModel, argument: sp.Expr) -> sp.Expr:
+    """As a sign keeps it, which may be with the other sign and without a factor."""
+    (kept,) = sgn(with_values(model, argument)).atoms(sgn)
+    return kept.args[0]
+
+
 def has_skew(model: CompiledModel) -> bool:
     """Whether the inputs are measured by sensors and derived, so that a delay between sensors matters."""
     return any(jet in model.opaque and not model.opaque[jet].has(Integral) for jet in _inputs(model))
@@ -310,7 +316,7 @@ class _Refine:
         self.widths: dict[sp.Symbol, sp.Expr] = {}  # that are refined: argument of the sign
         signs = {one: width_name(one) for one in signs_of(model)}
         width_symbols = {one: sp.Symbol(name, positive=True) for one, name in signs.items()}
-        self._signs = [one if widths is None else with_values(model, one) for one in signs]
+        self._signs = [one if widths is None else _argument_with_values(model, one) for one in signs]
         if widths is None:
             self.settings = (*width_symbols.values(), *(one.symbol for one in model.knowns))
         else:
