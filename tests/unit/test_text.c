@@ -31,14 +31,14 @@ static void test_a_number_that_is_none_has_a_text_too(void **state)
 {
     (void)state;
     assert_string_equal(pvid_reason_text((pvid_reason)(PVID_HELD_DISAGREES + 1)), "unknown reason");
-    assert_string_equal(pvid_status_text((pvid_status)(PVID_BAD_LAYOUT + 1)), "unknown status");
+    assert_string_equal(pvid_status_text((pvid_status)(PVID_BAD_COMMISSION_CHECK + 1)), "unknown status");
     assert_string_equal(pvid_reason_text((pvid_reason)INT32_MAX), "unknown reason");
 }
 
 static void test_every_status_has_a_text_of_its_own(void **state)
 {
     (void)state;
-    for (int a = 0; a <= (int)PVID_BAD_LAYOUT; a++) {
+    for (int a = 0; a <= (int)PVID_BAD_COMMISSION_CHECK; a++) {
         for (int b = 0; b < a; b++) {
             assert_string_not_equal(pvid_status_text((pvid_status)a), pvid_status_text((pvid_status)b));
         }
