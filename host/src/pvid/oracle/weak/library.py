@@ -18,36 +18,13 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import record_of
 from pvid.oracle.weak.scores import Scores, between
 from pvid.oracle.weak.solve import Fit
-from pvid.oracle.weak.terms import (
-    ACTS,
-    CONSTANT,
-    GAIN,
-    GRADUAL,
-    JUMPS,
-    LAWS,
-    OF_GAIN,
-    OF_LOAD,
-    OF_OFFSET,
-    OF_PARAMETER,
-    OFFSET,
-    SOFT,
-    SOFT_WIDTHS,
-    Act,
-    Candidate,
-    Change,
-    Law,
-    Recorded,
-)
+from pvid.oracle.weak.terms import ACTS, CONSTANT, GAIN, LAWS, SOFT, SOFT_WIDTHS, Act, Candidate, Change, Law, Recorded
 
 _RATE = (21, 2)  # samples and degree that give a sensor's rate in a law
 
 # A law that an equation has already is there in another size: this part of the term is the most that is believed.
 _ALIKE = 0.99  # cosine of the two columns
 _PART = 0.3
-
-# What is a candidate as it is, and as it changes during the run.
-_COURSES = ((GAIN, OF_GAIN), (OFFSET, OF_OFFSET), (CONSTANT, OF_LOAD))
-_MOST_GAIN = 0.6  # largest believable change of a gain
 
 _STEP = 1e-3  # of a signal's size: of the differences that give a column
 
@@ -96,11 +73,6 @@ class Library:
     @cached_property
     def candidates(self) -> list[Candidate]:
         """All, without scores."""
-        return [*self._steady, *(one for whole in self._changing for one in self._in_time(whole))]
-
-    @cached_property
-    def _steady(self) -> list[Candidate]:
-        """What is the same all the time."""
         return [*self._laws(), *self._soft_frictions(), *self._acts()]
 
     def _laws(self) -> Iterator[Candidate]:
@@ -117,8 +89,7 @@ class Library:
             for law in LAWS:
                 if (law.angle and not turns) or (law.signs and not changes):
                     continue
-                width = law.part * float(np.max(np.abs(x))) or law.width * float(np.sqrt(np.mean(v**2)))
-                width = float(f"{width:.2g}")
+                width = float(f"{law.width * float(np.sqrt(np.mean(v**2))):.2g}")
                 named.append((one.signal.name, law, width))
                 values.append(law.of(x, v, width))
         sums = functions.window_sums(np.array(values))[:, rows.numbers]
@@ -151,55 +122,6 @@ class Library:
                     for level in act.tried(one):
                         yield self.act(one, act, level)
 
-    @cached_property
-    def _changing(self) -> list[Candidate]:
-        """What may change during the run, as if it did so all the time: parameters, and of the other candidates gains,
-        offsets and constants."""
-        rows, parameters = self.fit.rows, self.fit.parameters
-        slopes, unit = parameters.jacobian(self.fit.p), parameters.unit(self.fit.p)
-        out = []
-        for k, name in enumerate(parameters.names):
-            change = [
-                np.einsum("wjk,j->wk", own[:, : len(of)], of[:, k])
-                for own, of in zip(rows.columns, slopes, strict=True)
-            ]
-            out.append(Candidate(name, "", OF_PARAMETER, 0.0, _fixed(change), float(unit[k])))
-        for one in self._steady:
-            course = next((course for kind, course in _COURSES if one.kind is kind), None)
-            if course is not None:
-                out.append(replace(one, kind=course, top=1.0, most=_MOST_GAIN if course is OF_GAIN else one.most))
-        return out
-
-    def _in_time(self, one: Candidate) -> Iterator[Candidate]:
-        """Gradually and at once."""
-        begin, end, last = self._spans
-        for course in GRADUAL:
-            yield replace(one, change=_times(one, course((begin + end) / 2)))
-        for part in JUMPS:
-            yield self._jumping(one, part * last)
-
-    def _jumping(self, one: Candidate, at: float) -> Candidate:
-        """A change at a time [s]."""
-        begin, end, last = self._spans
-        return replace(one, level=at, change=_times(one, np.clip((end - at / last) / (end - begin), 0, 1)))
-
-    def jumps_near(self, one: Candidate, part: float) -> list[Candidate]:
-        """The same a part of the run earlier, and later."""
-        whole = next(other for other in self._changing if other.family == one.family)
-        return [self._jumping(whole, one.level + part * sign * self._spans[2]) for sign in (-1, 0, 1)]
-
-    @cached_property
-    def _spans(self) -> tuple[Float, Float, float]:
-        """Begin and end of each window, in parts of its recording [windows], and the longest recording [s]."""
-        rows = self.fit.rows
-        end, length = rows.end_times(), 2 * rows.functions.hop * rows.functions.dt
-        begin, last = end - length, 0.0
-        for number in np.unique(rows.recordings):
-            own = rows.recordings == number
-            first, whole = begin[own].min(), end[own].max() - begin[own].min()
-            begin[own], end[own], last = (begin[own] - first) / whole, (end[own] - first) / whole, max(last, whole)
-        return begin, end, last
-
     def act(self, recorded: Recorded, act: Act, level: float) -> Candidate:
         """One at a level."""
         other = recorded.under(act, level)
@@ -222,17 +144,9 @@ class Library:
                 yield one
 
 
-def _fixed(change: list[Float]) -> Change:
-    return lambda theta: change
-
-
-def _times(one: Candidate, weights: Float) -> Change:
-    """A candidate's change in each window so many times [windows]."""
-    return lambda theta: [own * weights[:, np.newaxis] for own in one.change(theta)]
-
-
 def _in_row(sums: Float, kind: int, kinds: int) -> Change:
-    return _fixed([sums if kind == other else np.zeros(sums.shape) for other in range(kinds)])
+    whole = [sums if kind == other else np.zeros(sums.shape) for other in range(kinds)]
+    return lambda theta: whole
 
 
 def _believable(columns: Float, theta: Float, sums: Float) -> Float:

@@ -23,7 +23,7 @@ from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.scores import FOLDS, Scores
 from pvid.oracle.weak.solve import Fit, resumed
-from pvid.oracle.weak.terms import CONSTANT, JUMPS, OF_PARAMETER, UNUSUAL, UNUSUAL_LAWS, Act, Candidate, Course
+from pvid.oracle.weak.terms import UNUSUAL, UNUSUAL_LAWS, Act, Candidate
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
@@ -37,26 +37,23 @@ VISIBLE = 0.01  # of the value
 
 # Terms are named by fits with them.
 _MOST_TERMS = 3
-_LARGE = 0.05  # share of a term that is named even if it moves no parameter
+_LARGE = 0.25  # share of a term that is named even if it moves no parameter
 _FAMILIES = 5  # that are fitted for each
 _TRIED = 0.3  # of the best share
 _DISTINCT = 0.01  # of a column's square, that is its own: a term with less is the parameters in another guise
 _OF_BEST = 0.001  # the same of the term that explains most
 _SAME = 0.9999  # cosine of two columns, beside all parameters, that no run tells apart
 _RIVAL = 0.9  # of the best gain of likelihood
-_EQUAL = 0.9999  # of the best gain: the same column
 _MOST_RIVALS = 5
-_NOISE, _NOTICED = 2.0, 1.5  # chi^2 that is the sensors'; from which a term that explains much is looked for
+_NOISE = 2.0  # chi^2 that is the sensors'
 # Of the residuals beyond it: a law that imitates the missing one explains half to nine tenths of them.
 _ALL, MOST = 0.95, 0.9
 _ROUNDS = 6  # of a size
 _SETTLED = 0.01  # of a size
-_NOTHING = 0.01  # of a parameter
 _BEYOND = 1.5  # times the largest level that is tried, or over the smallest one
 _AT_REST = 0.05  # of the variance of an equation's error
 _FACTORS, _STEPS = (1.25, 1.08, 1.025), 4  # of a level, as often as it gets better
 _PART = 0.01  # of a level: a step that gives its slope
-_HALVINGS = 4  # of the distance of two jumps
 _PASSES = 3  # of whitening in a fit that begins near its end
 
 
@@ -137,7 +134,7 @@ class Missing:
     @property
     def is_large(self) -> bool:
         """Whether a term explains much of what the sensors' noise does not, whether or not it moves a parameter."""
-        return bool(self.there) and self.there[0].share > _LARGE and chi2_of_sensors(self.scores.fit) > _NOTICED
+        return bool(self.there) and self.there[0].share > _LARGE and chi2_of_sensors(self.scores.fit) > _NOISE
 
     def groups(self) -> list[list[Candidate]]:
         """Families that may be meant, of each its best, those together that no run tells apart; in each group, and of
@@ -218,8 +215,7 @@ def explained(library: Library, found: Missing) -> Explained:
         best = next(group for group in distinct if group[0].family == gains[0][1].family)
         gains = sorted(gains + _gains(library, fit, before, best[1:_FAMILIES]), key=lambda one: -one[0])
         alike = [one for one in gains if one[0] > _RIVAL * gains[0][0]]
-        equal = _EQUAL * gains[0][0]
-        _, chosen, fit = min(alike, key=lambda one: (_is_unusual(one[1]), one[0] < equal, not _is_simple(one[1])))
+        _, chosen, fit = min(alike, key=lambda one: _is_unusual(one[1]))
         # Beside those: what is the same column as one of them, and what explains as much and was not tried.
         families = [one.family for _, one, _ in alike]
         untried = [
@@ -235,8 +231,7 @@ def explained(library: Library, found: Missing) -> Explained:
             with_named, left = fit, chi2_of_sensors(fit)
             named.append(Named(chosen, _error_of(library, chosen, fit), tuple(rivals[:_MOST_RIVALS])))
             share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
-            few = len(named) < _MOST_TERMS  # three terms imitate much
-            complete = left < _NOISE or share > _ALL or share > MOST and few and not found.visible.any()
+            complete = left < _NOISE or share > _ALL or share > MOST and not found.visible.any()
         if complete and not found.visible.any():
             break
     return Explained(tuple(named), with_named, fit, share, complete)
@@ -279,14 +274,8 @@ def word_of(one: Candidate) -> str:
 
 def _is_unusual(one: Candidate) -> bool:
     """Of terms that explain a run alike those that are less often the cause: a signal that is early, and the cosine of
-    an angle beside an offset of its sensor, and what changes during the run."""
-    return word_of(one) in UNUSUAL or one.kind in UNUSUAL_LAWS or isinstance(one.kind, Course)
-
-
-def _is_simple(one: Candidate) -> bool:
-    """Of terms that are the same column: a constant, of what is the same where a signal does not change its sign, and a
-    parameter of what changes."""
-    return one.kind in (CONSTANT, OF_PARAMETER)
+    an angle beside an offset of its sensor."""
+    return word_of(one) in UNUSUAL or one.kind in UNUSUAL_LAWS
 
 
 def unlikelihood(fit: Fit) -> float:
@@ -309,29 +298,10 @@ def _refitted(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fi
     if isinstance(one.kind, Act) and one.kind.exact:
         one = replace(one, kind=one.kind.exact, level=one.size, size=1.0)
     try:
-        if isinstance(one.kind, Course) and one.level:
-            one = _nearest_jump(library, fit, one)
         with_it = _leveled(library, fit, one) if one.leveled else _sized(fit, one)
     except (np.linalg.LinAlgError, ArithmeticError, PvidError):
         return None
-    if with_it is None or not _is_nearer(with_it[1], fit) or _takes_place(with_it[1], fit):
-        return None
-    return with_it
-
-
-def _takes_place(one: Fit, other: Fit) -> bool:
-    """Whether next to nothing is left of a parameter: the term is there in its place."""
-    positive = other.parameters.positive
-    return bool(np.any(one.p[positive] < _NOTHING * other.p[positive]))
-
-
-def _nearest_jump(library: Library, fit: Fit, one: Candidate) -> Candidate:
-    """A change at the time at which it explains most."""
-    scores, part = Scores(fit), JUMPS[1] - JUMPS[0]
-    for _ in range(_HALVINGS):
-        part /= 2
-        one = scores.of(library.jumps_near(one, part))[0]
-    return one
+    return with_it if with_it is None or _is_nearer(with_it[1], fit) else None
 
 
 def _is_nearer(one: Fit, other: Fit) -> bool:
