@@ -51,7 +51,7 @@ PLATFORMS = {"host": "unix64", "cortex_m": "unix32", "riscv": "unix32", "avr": "
 # cppcheck reads a source once for every set of macros that it or a header chooses by, which takes MISRA's rules half a
 # second each. Headers choose alike for every source: all are read with the macros that they choose by themselves, and
 # these, which include every header that chooses, once more with all macros.
-WHOLE = ("values_q31.c", "weak_step_f32.c")
+WHOLE = ("publication.c", "values_q31.c", "weak_step_f32.c")
 FEWER_PATHS = ("-Xclang", "-analyzer-config", "-Xclang", "max-nodes=75000")  # of 225000, of each function
 UNUSED = ("2.3", "2.4", "2.5")  # MISRA's rules of what a program never uses: of some of the sources they say nothing
 PACKAGES = {
