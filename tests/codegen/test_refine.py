@@ -304,7 +304,7 @@ def evaluated(made: RefineFunctions, name: str, given: Given) -> list[Float]:
 
 
 def test_a_sign_may_have_constants_in_its_argument() -> None:
-    """sgn((v + s w) / r) of a wheel: with the values of r and s it stands with the other sign, or without a factor."""
+    """With the values of r and s, SymPy writes sgn((s w - v)/r) of a wheel as -sgn(20 v - 7 w)."""
     model = Model("wheel")
     tau, v, w = model.input("tau", "N*m", hold="zoh"), model.sensor("v", "m/s", 1e-3), model.sensor("w", "rad/s", 1e-3)
     r, s = model.known("r", "m", 0.05), model.known("s", "m", 0.35)

@@ -51,5 +51,4 @@ def test_a_bound_that_no_longer_acts_lets_its_parameter_go() -> None:
     assert core.estimate.p[0] == 0.0
     more = rng.normal(size=(2000, 2))
     core.add(more, more @ [0.8, 1.0] + SIGMA * rng.normal(size=2000))
-    both = np.concatenate([n, more])
-    assert core.estimate.p[0] == pytest.approx(0.71, abs=0.05) and np.isfinite(both).all()
+    assert core.estimate.p[0] == pytest.approx(0.71, abs=0.05)

@@ -104,6 +104,14 @@ static inline uint8_t pvid_step_pin_f32(pvid_system_f32 *system, const pvid_solv
     return pinned;
 }
 
+/* dp = 0 for the pinned parameters. */
+static inline void pvid_step_hold_f32(size_t n, uint8_t pinned, float dp[])
+{
+    for (size_t a = 0; (pinned != 0u) && (a < n); a++) {
+        dp[a] = pvid_step_has_f32(pinned, a) ? 0.0f : dp[a];
+    }
+}
+
 /* Factor that shortens a step of this relative size to the step limit; sets *limited. */
 static inline float pvid_step_shortening_f32(const pvid_solve_settings_f32 *settings, float size, bool *limited)
 {
@@ -171,9 +179,7 @@ static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_
         return;
     }
     pvid_cholesky_solve_f32(factor, rhs, dp);
-    for (size_t a = 0; (pinned != 0u) && (a < settings->n_p); a++) {
-        dp[a] = pvid_step_has_f32(pinned, a) ? 0.0f : dp[a];
-    }
+    pvid_step_hold_f32(settings->n_p, pinned, dp);
     const float size = pvid_step_size_f32(settings, p, dp);
     if (!pvid_finite_f32(size)) {
         solution->reason = PVID_HELD_SINGULAR;

@@ -585,9 +585,7 @@ static PVID_COLD const float *raise_pinned(const strong_estimator_f32 *self, flo
 static PVID_COLD void hold_pinned(strong_estimator_f32 *self, float dp[STRONG_P])
 {
     pvid_count_up(&self->counters.bounded);
-    for (size_t a = 0; a < STRONG_P; a++) {
-        dp[a] = pvid_step_has_f32(self->pinned, a) ? 0.0f : dp[a];
-    }
+    pvid_step_hold_f32(STRONG_P, self->pinned, dp);
 }
 
 /* Solves (S + H0) dp = rhs and moves p; projected: rhs is of all rows. In one place, for all schedules. */

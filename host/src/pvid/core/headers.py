@@ -7,7 +7,6 @@ import io
 import os
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -17,9 +16,8 @@ import cffi
 import numpy as np
 import numpy.typing as npt
 
-from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.core.sources import IS_CLONE, PACKAGE, ROOT, cache_folder
+from pvid.core.sources import IS_CLONE, PACKAGE, ROOT, cache_folder, keep_text, kept_text
 
 HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the build makes with them
 
@@ -220,8 +218,9 @@ def _compiled(text: str) -> str:
     once: the text stays in the cache of builds."""
     name = hashlib.sha256("\n".join((cffi.__version__, text)).encode()).hexdigest()[:24]
     place = cache_folder() / "headers" / f"{name}.py"
-    with suppress(OSError):
-        return place.read_text(encoding="utf-8")
+    kept = kept_text(place)
+    if kept:
+        return kept
     from cffi import recompiler  # with the parser of C
 
     ffi = cffi.FFI()
@@ -229,7 +228,5 @@ def _compiled(text: str) -> str:
     ffi.cdef(without.replace("extern const ", "extern "))
     out = io.StringIO()
     recompiler.make_py_source(ffi, "pvid_headers", out)
-    with suppress(OSError):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(place, out.getvalue(), freely=True)
+    keep_text(place, out.getvalue())
     return out.getvalue()

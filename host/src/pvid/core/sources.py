@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
+from pvid.base.atomic_write import write_whole
 from pvid.base.user_cache import built_under, user_cache
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -29,6 +31,20 @@ def build_folder() -> Path:
 def cache_folder() -> Path:
     """What is kept under all that it was made from: the user's cache, which clones share, else that of builds."""
     return (user_cache() or build_folder()) / "cache"
+
+
+def kept_text(place: Path) -> str:
+    """A text of the cache; "" where there is none."""
+    with suppress(OSError):
+        return place.read_text(encoding="utf-8")
+    return ""
+
+
+def keep_text(place: Path, text: str) -> None:
+    """Keeps a text in the cache, where this user may write there."""
+    with suppress(OSError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(place, text, freely=True)
 
 
 def core_sources(pattern: str = "*.c") -> list[Path]:

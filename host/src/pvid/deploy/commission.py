@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pvid.codegen import describe
-from pvid.codegen.c_text import initialised, table
+from pvid.codegen.c_text import for_cpp, initialised, table
 from pvid.configuration.excitation import DesignedDrive, Excitation, Guard, Tone
 from pvid.deploy.deployment import Deployment, Files
 from pvid.design.c_tables import float_literal
@@ -30,6 +30,28 @@ def _header(d: Deployment, e: Excitation) -> str:
     name, upper = d.name, d.upper
     seconds = 2 * (e.burst_s + 2 * e.ramp_s)
     rows = [(f"drive[{k}]", one.name, f"[{one.unit or '1'}]", f"up to {one.limit:g}") for k, one in enumerate(e.drives)]
+    declared = [
+        "/* PVID_OK, or the wrong field: pvid_status_text(status). */",
+        f"pvid_status {name}_commission_init(void);",
+        "",
+        "/* Returns false while a commissioning runs. */",
+        f"bool {name}_commission_start(void);",
+        "",
+        "/* One tick: the drives for these samples, of which those that are drives are ignored. Cost: some hundred",
+        " * instructions, never a step of the identifier. */",
+        f"pvid_commission_state {name}_commission_step(const {d.sample_type} sample[{upper}_SAMPLES], "
+        f"float drive[{upper}_DRIVES]);",
+        "",
+        "/* Background: one sample of the identifier. Returns whether there may be more to do at once. */",
+        f"bool {name}_commission_work(void);",
+        "",
+        "/* The drives fall to 0 at their slew rates. */",
+        f"void {name}_commission_abort(void);",
+        "",
+        "/* Its verdict is PVID_COMMISSION_PENDING before the end. */",
+        f"const pvid_commission_result_f32 *{name}_commission_result(void);",
+        "",
+    ]
     return "\n".join(
         [
             f"/* {name}_commission.h - {d.title}: excites the mechanism within its limits, identifies it, checks the",
@@ -53,36 +75,10 @@ def _header(d: Deployment, e: Excitation) -> str:
             '#include "pvid/commission.h"',
             "",
             f"#define {upper}_DRIVES {max(len(e.drives), 1)}",
-            f"#define {upper}_RING_TICKS {_ring_ticks(e)}u /* {_ring_bytes(d, e)} bytes */",
+            f"#define {upper}_RING_TICKS {e.burst_ticks}u /* {4 * len(d.samples) * e.burst_ticks} bytes */",
             "",
             *_places(d),
-            "#ifdef __cplusplus",
-            'extern "C" {',
-            "#endif",
-            "",
-            "/* PVID_OK, or the wrong field: pvid_status_text(status). */",
-            f"pvid_status {name}_commission_init(void);",
-            "",
-            "/* Returns false while a commissioning runs. */",
-            f"bool {name}_commission_start(void);",
-            "",
-            "/* One tick: the drives for these samples, of which those that are drives are ignored. Cost: some hundred",
-            " * instructions, never a step of the identifier. */",
-            f"pvid_commission_state {name}_commission_step(const {d.sample_type} sample[{upper}_SAMPLES], "
-            f"float drive[{upper}_DRIVES]);",
-            "",
-            "/* Background: one sample of the identifier. Returns whether there may be more to do at once. */",
-            f"bool {name}_commission_work(void);",
-            "",
-            "/* The drives fall to 0 at their slew rates. */",
-            f"void {name}_commission_abort(void);",
-            "",
-            "/* Its verdict is PVID_COMMISSION_PENDING before the end. */",
-            f"const pvid_commission_result_f32 *{name}_commission_result(void);",
-            "",
-            "#ifdef __cplusplus",
-            "}",
-            "#endif",
+            *for_cpp(declared),
             "",
             "#endif",
             "",
@@ -104,14 +100,6 @@ def _predicted(d: Deployment, e: Excitation) -> list[str]:
         f"{one.name} {100 * error:.2g} %" for one, error in zip(d.parameters, e.prediction.relative, strict=True)
     )
     return [" *", " * Standard errors that a burst gives at the model's guesses, of noise alone:", f" *   {errors}"]
-
-
-def _ring_ticks(e: Excitation) -> int:
-    return e.burst_ticks
-
-
-def _ring_bytes(d: Deployment, e: Excitation) -> int:
-    return 4 * len(d.samples) * _ring_ticks(e)
 
 
 def _source(d: Deployment, e: Excitation) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from pvid.codegen.c_text import for_cpp
 from pvid.deploy.deployment import Deployment, Files, Quantity
 from pvid.design.c_tables import float_literal
 from pvid.settings.enums import Reason
@@ -124,6 +125,14 @@ def example_files(deployment: Deployment) -> Files:
 
 def _header(d: Deployment) -> str:
     seconds = len(d.playback.counts) / d.sample_rate
+    declared = [
+        "/* The samples of a tick. Returns false behind the last one. */",
+        f"bool {d.name}_example_sample(uint32_t tick, {d.sample_type} sample[{d.upper}_SAMPLES]);",
+        "",
+        "/* Line k as text, as in 'R = 1.2043 +- 0.00420 ohm'; k less than the number of lines. */",
+        f"const char *{d.name}_example_line(int k, char line[{d.upper}_EXAMPLE_LINE]);",
+        "",
+    ]
     return "\n".join(
         [
             f"/* {d.name}_example.h - {seconds:.3g} s of a recorded motion, in place of your sensors.",
@@ -138,19 +147,7 @@ def _header(d: Deployment) -> str:
             f"#define {d.upper}_EXAMPLE_LINES {_lines(d)} /* {_all_lines(d)} */",
             f"#define {d.upper}_EXAMPLE_LINE {_longest_line(d)} /* characters, with the 0 at the end */",
             "",
-            "#ifdef __cplusplus",
-            'extern "C" {',
-            "#endif",
-            "",
-            "/* The samples of a tick. Returns false behind the last one. */",
-            f"bool {d.name}_example_sample(uint32_t tick, {d.sample_type} sample[{d.upper}_SAMPLES]);",
-            "",
-            "/* Line k as text, as in 'R = 1.2043 +- 0.00420 ohm'; k less than the number of lines. */",
-            f"const char *{d.name}_example_line(int k, char line[{d.upper}_EXAMPLE_LINE]);",
-            "",
-            "#ifdef __cplusplus",
-            "}",
-            "#endif",
+            *for_cpp(declared),
             "",
             "#endif",
             "",

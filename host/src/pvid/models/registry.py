@@ -1,8 +1,8 @@
 """The shipped mechanisms, and what a call names beside them.
 
 A mechanism is a `str`, the name of a shipped one, a `Path`, a model file, which is Python and runs, or a `Model` of the
-program that calls. Texts (a rig
-file, a log) contain `str` alone; `asked_for` alone makes a `Path`, of what the user of this call named himself.
+program that calls. Texts (a rig file, a log) contain `str` alone; `asked_for` alone makes a `Path`, of what the user of
+this call named himself.
 """
 
 from __future__ import annotations

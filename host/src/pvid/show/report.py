@@ -22,7 +22,7 @@ from pvid.base.version import __version__
 from pvid.base.wording import listed, reason, with_unit
 from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.sensor_prediction import SensorPrediction
-from pvid.identification.summary import REACH, Made, has_0, head, prefixed, printed_unit, sentences, shown
+from pvid.identification.summary import REACH, VERDICTS, Made, has_0, head, prefixed, printed_unit, sentences, shown
 from pvid.identification.validation import Validation
 from pvid.model.readable import readable
 from pvid.oracle.weak.words import Word
@@ -30,12 +30,6 @@ from pvid.show import answer_figure
 from pvid.show.document import document, picture, table, text
 
 _CLASS: dict[Word, str] = {"good": "good", "usable": "usable", "not_explained": "bad", "not_identified": "bad"}
-_WORDS: dict[Word, str] = {
-    "good": "good",
-    "usable": "usable",
-    "not_explained": "not explained",
-    "not_identified": "not identified",
-}
 _PARTS = (
     ("se_noise", "noise", "var(--value)", "noise of the sensors: a longer recording makes it smaller"),
     (
@@ -104,7 +98,7 @@ def _values(values: Mapping[str, Value]) -> str:
     """Each with its interval."""
     rows = []
     for name, one in values.items():
-        told, word = shown(one), f'<span class="{_CLASS[one.word]}">{_WORDS[one.word]}</span>'
+        told, word = shown(one), f'<span class="{_CLASS[one.word]}">{VERDICTS[one.word][0].lower()}</span>'
         if told is None:
             rows.append([text(name), "not determined", text(one.reason or ""), word])
             continue

@@ -18,7 +18,6 @@ from typing import Any
 import sympy as sp
 
 import pvid.codegen
-from pvid.base.atomic_write import write_whole
 from pvid.codegen.files_refine import DOUBLE, function
 from pvid.codegen.operations import Program
 from pvid.codegen.refine import (
@@ -28,7 +27,7 @@ from pvid.codegen.refine import (
     is_driven_by_derivatives,
     refine_functions_of,
 )
-from pvid.core.sources import cache_folder
+from pvid.core.sources import cache_folder, keep_text, kept_text
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Jet
 
@@ -44,14 +43,12 @@ def printed(model: CompiledModel) -> tuple[RefineFunctions, str]:
         Where the equations do not determine a motion.
     """
     place = cache_folder() / "kernels" / f"{_key(model)}.json"
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        kept = json.loads(place.read_text(encoding="utf-8"))
+    with suppress(ValueError, KeyError, TypeError):  # no such text, or none of ours
+        kept = json.loads(kept_text(place))
         return _of_data(model, kept["made"]), str(kept["code"])
     made = refine_functions_of(model, None, is_driven_by_derivatives(model))
     code = _code(made, any(one.edge == "before" for one in model.signals))
-    with suppress(OSError):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(place, json.dumps({"made": _data(made), "code": code}), freely=True)
+    keep_text(place, json.dumps({"made": _data(made), "code": code}))
     made = replace(made, functions={name: replace(one, program=_NO_PROGRAM) for name, one in made.functions.items()})
     return made, code
 

@@ -10,13 +10,11 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import ModuleType
 
-from pvid.base.atomic_write import write_whole
-from pvid.core.sources import cache_folder
+from pvid.core.sources import cache_folder, keep_text, kept_text
 from pvid.twin.printer.directives import Reader
 from pvid.twin.printer.translate import Translator
 
@@ -72,15 +70,11 @@ def printed_module(
     made_from = repr((_PRINTER, sorted(macros.items()), list(roots), sorted((texts or {}).items())))
     key = _hash_of(sources, folders, made_from)
     place = cache_folder() / "twins" / f"{key[:24]}.py"
-    text = ""
-    with suppress(OSError):
-        text = place.read_text(encoding="utf-8")
+    text = kept_text(place)
     if not text:
         text = text_of(sources, folders, macros, roots, texts)
         if _hash_of(sources, folders, made_from) == key:  # nobody has edited them meanwhile
-            with suppress(OSError):
-                place.parent.mkdir(parents=True, exist_ok=True)
-                write_whole(place, text, freely=True)
+            keep_text(place, text)
     return loaded(text, str(place))
 
 
