@@ -33,6 +33,7 @@ from types import FrameType
 import click
 import numpy as np
 
+from bench.case import Advance, Report
 from bench.kinds import KINDS as KINDS_OF_MECHANISM
 from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.cli import main as cli
@@ -540,3 +541,22 @@ def command_line(draw: random.Random) -> list[str]:
     if draw.random() < 0.03:
         line.append(draw.choice((*_NUMBERS, *_NAMES, "--nope", "-h", "--version")))
     return line
+
+
+def report(
+    mutants: int,
+    seed: int,
+    only: Sequence[str],
+    processes: int,
+    keep: Path | None,
+    done: Path | None,
+    advance: Advance,
+) -> Report:
+    """See bench.case."""
+    tallies = campaign(only or KINDS, mutants, seed, processes, lambda _: advance(), keep and keep.resolve(), done)
+    faults = [
+        f"{one.kind}, mutant {number}: {' '.join(arguments)}: {wrong}"
+        for one in tallies
+        for arguments, wrong, number in one.defects
+    ]
+    return Report([("attack", HEADER, [one.cells for one in tallies])], faults)

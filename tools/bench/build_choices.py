@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from bench.case import Advance, Report
 from pvid.board import mechanism_image, mechanism_image_q31
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image import build_with, mechanism_run
@@ -78,9 +79,13 @@ def footprint_of(choice: Choice, place: int) -> Footprint:
     return measured(board, built_weak(image, tree, name))[0]
 
 
-def rows_of(progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:
-    """All rows."""
-    for place, choice in enumerate(CHOICES):
-        progress(place)
-        found = footprint_of(choice, place)
-        yield choice.title, *map(str, (found.text, found.bss, found.mean, found.longest))
+def report(advance: Advance) -> Report:
+    """See bench.case."""
+
+    def rows() -> Iterator[tuple[str, ...]]:
+        for place, choice in enumerate(CHOICES):
+            found = footprint_of(choice, place)
+            yield choice.title, *map(str, (found.text, found.bss, found.mean, found.longest))
+            advance()
+
+    return Report([("build-choices", HEADER, rows())])

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from bench.case import Advance, Report
 from bench.replay import Replay
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
@@ -126,7 +127,7 @@ def _rounded(values: Float, step: float) -> Float:
     return np.asarray(np.round(values, round(-np.log10(step))))
 
 
-def write(folder: Path) -> list[Path]:
+def written(folder: Path) -> list[Path]:
     """Writes the records and their PROVENANCE; gives the files."""
     paths = [folder / f"{load.name}.csv.gz" for load in LOADS]
     for load, path in zip(LOADS, paths, strict=True):
@@ -224,3 +225,10 @@ def outcomes() -> Iterator[Outcome]:
     for first, second in zip(LOADS[::2], LOADS[1::2], strict=True):
         for title, name in MODELS:
             yield outcome(title, name, first.name, second.name)
+
+
+def report(write: Path | None, advance: Advance) -> Report:
+    """See bench.case; with a folder, its records are written there instead."""
+    if write is not None:
+        return Report(said=[f"{path} written" for path in written(write)])
+    return Report([("cell", HEADER, [one.cells() for one in outcomes()])])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.case import Advance, Report, counts
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.link import frames as link
@@ -122,3 +123,16 @@ def decode_in_c(native: Native, data: bytes) -> list[tuple[int, int, bytes]]:
         found.append((number, tick, raw[at : at + length]))
         at += length
     return found
+
+
+def report(frames: int, advance: Advance) -> Report:
+    """See bench.case."""
+    tally = corrupt(frames, Native(), progress=lambda _: advance())
+    numbers = (
+        ("corrupted frames", tally.frames),
+        ("accepted with wrong content", tally.wrong),
+        ("first good frame behind lost", tally.lost_first),
+        ("second good frame behind lost", tally.lost_second),
+    )
+    faults = ["a decoder accepts wrong content or loses the second good frame"] * bool(tally.wrong or tally.lost_second)
+    return Report([counts("codec", numbers)], faults)

@@ -20,6 +20,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from bench.case import DIFFERS, Advance, Report
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31, replay_image
 from pvid.board.boards import Board, one_at_a_time
@@ -100,7 +101,6 @@ _ROWS: tuple[tuple[Callable[[], Case], tuple[Hardware, ...]], ...] = (
     (lambda: _weak_f32("dc_motor"), FPUS),
     (lambda: _weak_q31("kapitza"), (WITHOUT,)),
 )
-STEPS = sum(len(cores) for _, cores in _ROWS)
 
 
 def cycle_rows(processes: int, progress: Callable[[], object] = lambda: None) -> Iterator[tuple[str, ...]]:
@@ -126,11 +126,16 @@ def cycle_rows(processes: int, progress: Callable[[], object] = lambda: None) ->
             progress()
 
 
+def report(processes: int, advance: Advance) -> Report:
+    """See bench.case."""
+    return Report([("cycles", HEADER, cycle_rows(processes, advance))])
+
+
 def row_of(title: str, fpu: str, report: replay_image.ReplayReport, equal: bool) -> tuple[str, ...]:
     """Cells of a run; its instructions are clock cycles."""
     mean, longest = round(report.instructions_mean), round(report.instructions_longest)
     shares = (f"{share(mean, clock):.2f}" for clock in CLOCKS_MHZ)
-    return (title, fpu, str(report.ticks), str(mean), str(longest), *shares, "equal" if equal else "DIFFERENT")
+    return (title, fpu, str(report.ticks), str(mean), str(longest), *shares, "equal" if equal else DIFFERS)
 
 
 def share(cycles: int, clock_mhz: int) -> float:

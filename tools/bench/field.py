@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import serial
 
+from bench.case import Advance, Report, counts
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import Streamed, settings_number
@@ -25,7 +26,7 @@ from pvid.link.port import Port, open_port
 from pvid.log.file import Segment
 from pvid.log.reader import Account, LogReader, Record
 from pvid.log.recorder import Logger
-from pvid.log.verify import Stretch, Verifier
+from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.rig.mechanism_file import MechanismRig
 
 _SAMPLES_A_FRAME = 16
@@ -263,3 +264,34 @@ def field_log(
     reader = LogReader(log)
     stretches = list(Verifier(board, progress).stretches(reader))
     return reader.account, stretches
+
+
+def report(on: str, samples: int, out: Path, advance: Advance) -> Report:
+    """See bench.case."""
+    account, stretches = field_log(on, samples, out, lambda _: advance())
+    verdict = Verdict()
+    for stretch in stretches:
+        verdict.add(stretch)
+    numbers = (
+        ("samples recorded", account.samples),
+        ("missing between them", account.missing_samples),
+        ("taken while the line was closed", account.unheard),
+        ("estimates and hashes compared", verdict.checked),
+        ("different", verdict.different),
+    )
+    whole = len(verdict.good) == len(account.segments) and not verdict.different and not account.missing_samples
+    said = [*(one.text for one in stretches), verdict.text, account.text]
+    return Report([counts("field-log", numbers)], [] if whole else ["not every segment is whole"], said)
+
+
+def log_report(frames: int, advance: Advance) -> Report:
+    """See bench.case."""
+    seen = throughput(frames)
+    numbers = (
+        ("frames of 16 samples", seen.frames),
+        ("lost", seen.lost),
+        ("frames in a minute of processor time", round(60 * seen.frames / seen.cpu_s)),
+        ("resident memory after a quarter, kB", seen.early_kb),
+        ("at the end, kB", seen.late_kb),
+    )
+    return Report([counts("log", numbers)], [] if seen.frames == frames and not seen.lost else ["frames are lost"])

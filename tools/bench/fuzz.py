@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import subprocess
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.case import Advance, Report, counts
 from pvid.base.errors import PvidError
 from pvid.core.sources import FIRMWARE, INCLUDES, PUBLIC_INCLUDES, ROOT, core_sources, source
 
@@ -89,3 +91,15 @@ def _run(what: str, folder: Path, command: list[str]) -> subprocess.CompletedPro
         said = (done.stdout + done.stderr).strip()
         raise PvidError(f"fuzzing {what} failed in {folder}: {said[-500:]}")
     return done
+
+
+def link_report(runs: int, advance: Advance) -> Report:
+    """See bench.case."""
+    folder = Path(tempfile.mkdtemp(prefix="pvid-fuzz-"))  # an input that breaks the link stays there
+    return Report([counts("fuzz-link", (("inputs", fuzz_link(folder, runs)), ("failures", 0)))])
+
+
+def api_report(calls: int, seed: int, advance: Advance) -> Report:
+    """See bench.case."""
+    with tempfile.TemporaryDirectory(prefix="pvid-fuzz-") as folder:
+        return Report([counts("fuzz-api", fuzz_api(Path(folder), calls, seed).counts)])

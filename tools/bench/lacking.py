@@ -15,6 +15,7 @@ from math import exp, tanh
 import numpy as np
 import numpy.typing as npt
 
+from bench.case import Advance, Report, counts
 from bench.plants import NOTHING, PLANTS, SAMPLES, Axis, Plant, States, Values
 from pvid.base.errors import PvidError
 from pvid.identification.road import identified
@@ -145,7 +146,6 @@ EFFECTS = (
 
 
 OF_TABLE = tuple(dict.fromkeys(one.plant for one in EFFECTS))  # plants
-ROWS = len(OF_TABLE) + len(EFFECTS)
 
 # ---- what any plant may have ----
 
@@ -736,3 +736,18 @@ def _counts(name: str, found: Sequence[Told]) -> tuple[str, ...]:
         sum(one.found.found.verdict.status != "good" for one in clean),
     )
     return (name, *map(str, counts), f"{100 * float(np.mean(covered)):.0f}")
+
+
+def report(clean: int, count: int, seed: int, advance: Advance) -> Report:
+    """See bench.case: the table of effects, or a campaign of so many recordings."""
+    if count:
+        found = []
+        for case in campaign(count, seed):
+            found += [one for one in [told(case, seed)] if one is not None]
+            advance()
+        return Report([(f"missing-campaign-{seed}", CAMPAIGN, campaign_cells(found))])
+    rows = []
+    for row in outcomes(clean):
+        rows.append(row)
+        advance()
+    return Report([("missing", HEADER, [row.cells() for row in rows]), counts("missing-sum", summary(rows))])

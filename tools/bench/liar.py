@@ -13,6 +13,7 @@ import re
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import traceback
@@ -27,9 +28,10 @@ import numpy as np
 import serial
 from rich.console import Console
 
+from bench.case import Advance, Report, counts
 from bench.liar_board import TICKS, Flood, HangUp, LyingBoard, Pause, Step, honest_samples, mechanism, rig
 from bench.liar_board import board as honest_board
-from bench.lies import Behaviour
+from bench.lies import BEHAVIOURS, Behaviour
 from pvid.base.errors import PvidError
 from pvid.board.target import Target
 from pvid.link.frames import Raw
@@ -326,3 +328,27 @@ def _drain(connection: socket.socket) -> None:
     with suppress(OSError):
         while connection.recv(1 << 16):
             pass
+
+
+def report(mutants: int, only: Sequence[str], advance: Advance) -> Report:
+    """See bench.case; only: names of behaviours, else all."""
+    from bench.liar_mutants import mutate
+
+    if unknown := [name for name in only if name not in BEHAVIOURS]:
+        raise PvidError(f"there is no behaviour {', '.join(unknown)}")
+    performances = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in only or BEHAVIOURS:
+            performances.append(perform(BEHAVIOURS[name], Path(folder)))
+            advance()
+        tally = mutate(mutants, Path(folder), progress=lambda _: advance())
+    faults = [f"{one.behaviour.name}: {fault}" for one in performances for fault in one.faults] + tally.faults
+    numbers = (
+        ("behaviours", len(performances)),
+        ("runs of a command", sum(len(one.codes) for one in performances)),
+        ("mutants of frames", tally.mutants),
+        ("defects", len(faults)),
+        ("largest memory of the logger, kB", max(one.peak_kb for one in performances)),
+        ("latest end of the logger, ms", round(1000 * max(one.late_s for one in performances))),
+    )
+    return Report([counts("liar", numbers)], faults)

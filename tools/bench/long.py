@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
+from bench.case import Advance, Report
 from pvid.base.errors import PvidError
 from pvid.core.sources import ROOT
 
@@ -57,3 +58,9 @@ def _rows(report: ElementTree.Element) -> list[tuple[str, ...]]:
         result = f"{failed} failed" if failed else "passed"
         rows.append((room, claim, str(len(of_it)), ", ".join(sorted(ticks, key=int)), result))
     return rows
+
+
+def report(only: tuple[str, ...], advance: Advance) -> Report:
+    """See bench.case."""
+    rows = long_table(only)
+    return Report([("long", HEADER, rows)], [f"{row[0]}: {row[1]}: {row[-1]}" for row in rows if row[-1] != "passed"])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,6 +18,7 @@ import numpy as np
 
 from bench.figures import results_of
 from pvid.base.atomic_write import write_whole
+from pvid.base.errors import PvidError
 from pvid.base.figure_file import save
 from pvid.base.replacing import replacing
 from pvid.cli.page_table import markdown
@@ -178,6 +181,22 @@ def page(name: str, example: Example, errors: str) -> str:
             "",
         ]
     )
+
+
+def printed_demo() -> str:
+    """What the demo prints.
+
+    Raises
+    ------
+    PvidError
+        When it fails.
+    """
+    with TemporaryDirectory() as folder:
+        command = [sys.executable, "-P", "-m", "pvid", "demo"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise PvidError(f"the demo failed: {(done.stderr or done.stdout).strip()[-300:]}")
+    return "\n".join(line.rstrip() for line in done.stdout.rstrip().splitlines())
 
 
 def printed_answer() -> str:

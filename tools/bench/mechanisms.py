@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bench.case import Advance, Table
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
@@ -22,7 +23,6 @@ from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
-Progress = Callable[[int], object]
 
 SEEDS = 20
 OFF = 0.5  # of a start: within +-50 % of the truth
@@ -208,7 +208,7 @@ def identified(
     *,
     own_design: bool = False,
     gain_sd: float = 0.0,
-    progress: Progress = int,
+    advance: Advance = lambda: None,
 ) -> Outcome:
     """Runs 0 to `seeds` - 1 of a mechanism.
 
@@ -228,7 +228,7 @@ def identified(
         begun = time.perf_counter()
         outcome.found.append(identify(model, run, simulation.rig.sample_rate, start_of(simulation, seed), design))
         outcome.seconds.append(time.perf_counter() - begun)
-        progress(1)
+        advance()
     return outcome
 
 
@@ -240,9 +240,9 @@ def declared(name: str, gain_sd: float) -> CompiledModel:
     return replace(model, signals=tuple(signals)) if gain_sd else model
 
 
-def smooth(name: str, seeds: int, progress: Progress = int) -> Outcome:
+def smooth(name: str, seeds: int, advance: Advance = lambda: None) -> Outcome:
     """Runs with a soft friction of known width, or none, with the rig's design."""
-    return identified(name, seeds, SOFT, own_design=True, progress=progress)
+    return identified(name, seeds, SOFT, own_design=True, advance=advance)
 
 
 def accuracy_rows(name: str, outcome: Outcome) -> Iterator[tuple[str, ...]]:
@@ -308,14 +308,14 @@ def two_window_rows(name: str, friction: str, outcome: Outcome) -> Iterator[tupl
         )
 
 
-def imperfection_rows(name: str, seeds: int, progress: Progress = int) -> Iterator[tuple[str, ...]]:
+def imperfection_rows(name: str, seeds: int, advance: Advance = lambda: None) -> Iterator[tuple[str, ...]]:
     """A row for each imperfection that the mechanism can have."""
     simulation = simulation_of(name)
     for case in CASES:
         imperfections = case.of(simulation)
         if imperfections is None:
             continue
-        outcome = identified(name, seeds, imperfections, gain_sd=case.gain_sd, progress=progress)
+        outcome = identified(name, seeds, imperfections, gain_sd=case.gain_sd, advance=advance)
         ratio = np.median(np.abs(outcome.errors) / outcome.se, axis=0)
         worst = int(np.argmax(ratio))
         yield (
@@ -336,26 +336,20 @@ def number_of_cases(name: str) -> int:
     return sum(case.of(simulation) is not None for case in CASES)
 
 
-Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
-
-
-def tables(names: tuple[str, ...], seeds: int, imperfect: int, progress: Progress = int) -> list[Table]:
-    """Marker, header and rows of each table of the page."""
+def tables(names: Sequence[str], seeds: int, advance: Advance) -> list[Table]:
+    """Of the page; imperfect rigs have a fourth of the runs."""
     accuracy, sharp, summary, early, cases = [], [], [], [], []
     for name in names:
-        soft = smooth(name, seeds, progress)
+        soft = smooth(name, seeds, advance)
         accuracy += list(accuracy_rows(name, soft))
-        chosen = identified(name, seeds, PERFECT, progress=progress)
+        chosen = identified(name, seeds, PERFECT, advance=advance)
         rubs = bool(soft.simulation.rig.friction_width)
         sharp += list(accuracy_rows(name, chosen))
-        own, free = (
-            "soft, of known width" if rubs else "none",
-            "sharp; design chosen" if rubs else "none; design chosen",
-        )
+        own, free = ("soft, of known width", "sharp; design chosen") if rubs else ("none", "none; design chosen")
         summary += [summary_row(name, own, soft), summary_row(name, free, chosen)]
         early += [*two_window_rows(name, own, soft), *two_window_rows(name, free, chosen)]
-        if imperfect:
-            cases += list(imperfection_rows(name, imperfect, progress))
+        if seeds >= 4:
+            cases += list(imperfection_rows(name, seeds // 4, advance))
     return [
         ("mechanisms", ACCURACY, accuracy),
         ("mechanisms-chosen", ACCURACY, sharp),

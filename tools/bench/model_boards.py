@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
+from bench.case import DIFFERS, Advance, Report
 from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
@@ -22,14 +23,8 @@ HEADER = ("board", "core", *KINDS, "bits")
 CORES: tuple[Core, ...] = ("f32", "q31")
 # One of each instruction set, with a floating point unit and without one.
 USUAL = (
-    "microbit",
-    "mps2-an385",
-    "mps2-an386",
-    "mps2-an505",
-    "mps3-an547",
-    "virt-rv32imac",
-    "virt-rv32imafc",
-    "atmega2560",
+    *("microbit", "mps2-an385", "mps2-an386", "mps2-an505", "mps3-an547"),
+    *("virt-rv32imac", "virt-rv32imafc", "atmega2560"),
 )
 TIMEOUT_S = 600.0
 _NO_FIGURE = {"the image does not fit": "no room", "float32 has no bits of the twin": "no float32"}
@@ -90,14 +85,16 @@ def row_of(board: Board, core: Core, names: tuple[str, ...] = KINDS) -> tuple[st
             cells.append(reason_for_no_figure(error))
             continue
         cells.append(f"{report.instructions_mean:.0f}")
-        equal = "DIFFERENT" if differs(report, wanted) or equal == "DIFFERENT" else "equal"
+        equal = DIFFERS if differs(report, wanted) or equal == DIFFERS else "equal"
     return f"{board.core} ({board.name})", core, *cells, equal
 
 
-def rows_of(
-    names: tuple[str, ...] = USUAL, progress: Callable[[int], None] = lambda _: None
-) -> Iterator[tuple[str, ...]]:
-    """Two rows for each board."""
-    for done, (board, core) in enumerate(rows(names)):
-        progress(done)
-        yield row_of(board, core)
+def report(board: tuple[str, ...], advance: Advance) -> Report:
+    """See bench.case: two rows for each board."""
+
+    def made() -> Iterator[tuple[str, ...]]:
+        for one, core in rows(board or USUAL):
+            yield row_of(one, core)
+            advance()
+
+    return Report([("model-boards", HEADER, made())])

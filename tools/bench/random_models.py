@@ -26,8 +26,10 @@ from typing import Any
 import numpy as np
 from sympy.core.cache import clear_cache
 
+from bench import senseless_models
+from bench.case import Advance, Report, Table
 from bench.random_motion import RandomRun, random_run
-from bench.random_rigs import IN_C, random_rig
+from bench.random_rigs import random_rig
 from pvid.base.errors import PvidError
 from pvid.cli.identify_run import recording_of
 from pvid.codegen.build import build
@@ -40,7 +42,7 @@ from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import config_for_recording
 from pvid.configuration.weak_q31 import weak_q31_for_recording
 from pvid.core.host_compiler import compiled_once, host_compiler
-from pvid.core.sources import INCLUDES, core_sources
+from pvid.core.sources import INCLUDES, build_folder, core_sources
 from pvid.deploy.deployment import Deployment
 from pvid.deploy.example import expected
 from pvid.deploy.of_rig import deployment_f32, deployment_q31
@@ -411,11 +413,6 @@ def _row(name: str, found: Sequence[Road]) -> tuple[str, ...]:
     )
 
 
-def covered(found: Sequence[Road]) -> Counter[str]:
-    """How many rigs have each feature of the grammar."""
-    return Counter(feature for one in found for feature in one.features)
-
-
 def compile_times() -> list[tuple[str, ...]]:
     """Processor time of each shipped mechanism, in a process that has compiled none yet."""
     out: list[tuple[str, ...]] = []
@@ -431,4 +428,18 @@ def compile_times() -> list[tuple[str, ...]]:
     return out
 
 
-__all__ = ["COMPILE_HEADER", "HEADER", "IN_C", "Road", "compile_times", "covered", "road_of", "roads", "table_of"]
+def report(count: int, seed: int, resume: bool, advance: Advance) -> Report:
+    """See bench.case."""
+    kept = build_folder() / f"random-models-{seed}.jsonl"
+    if not resume:
+        kept.unlink(missing_ok=True)
+    found = roads(range(seed, seed + count), kept, lambda _: advance())
+    senseless = senseless_models.run(range(seed, seed + 2 * count))
+    faults = [f"rig {one.seed} ({one.kind}): {failure}" for one in found for failure in one.failures]
+    faults += [f"description {number}: {error}" for number, error in senseless.tracebacks]
+    tables: list[Table] = [
+        ("random-models", HEADER, table_of(found)),
+        ("compile-times", COMPILE_HEADER, compile_times()),
+        ("senseless-models", senseless_models.HEADER, [senseless.row()]),
+    ]
+    return Report(tables, faults)

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from bench.recordings import PIECES, SOURCES, Source
+from bench.case import Advance, Report
+from bench.kept_recordings import KEPT
+from bench.recordings import MECHANISMS, PIECES, SOURCES, Source, write_source
 from bench.replay import Match, Replay
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.design import WeakDesign
@@ -235,3 +237,34 @@ def friction_of(p: Float, model: CompiledModel) -> Friction:
     """Sharp; soft where a friction is 0, which the simulation would look for at every reversal."""
     none = any(name.startswith("c") and value == 0.0 for name, value in zip(model.p_names, p, strict=True))
     return Friction(_SOFT) if none else SHARP
+
+
+def _report(sources: Sequence[Source], folder: Path, origins: Path | None, prefix: str) -> Report:
+    """Of the pieces in a folder; with `origins`, they are cut from there instead."""
+    if origins is not None:
+        return Report(said=[f"{path} written" for one in sources for path in write_source(one, origins, folder)])
+    found = list(rigs(folder, sources))
+    traps = [row for one in found for row in trap_rows(one.source, folder)]
+    faults = [fault for one in found for fault in missed(one)]
+    faults += [
+        f"{row[0]}: the run {row[1]} does not raise its alarm" for row in traps if row[1] not in row[2].split(", ")
+    ]
+    tables = [
+        (prefix + name, header, [row for one in found for row in rows_of(one)])
+        for name, header, rows_of in (
+            ("recordings", HEADER, value_rows),
+            ("predictions", PREDICTIONS, prediction_rows),
+            ("verdicts", VERDICTS, verdict_rows),
+        )
+    ]
+    return Report([*tables, ("traps", TRAPS, traps)], faults)
+
+
+def report(folder: Path, cut: Path | None, advance: Advance) -> Report:
+    """See bench.case."""
+    return _report(SOURCES, folder, cut, "")
+
+
+def kept_report(cut: Path | None, advance: Advance) -> Report:
+    """See bench.case."""
+    return _report(KEPT, MECHANISMS, cut, "kept-")

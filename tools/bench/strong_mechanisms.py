@@ -7,11 +7,12 @@ derivatives, the row, the step from theta to p, standard errors, gate and reason
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
 
+from bench.case import DIFFERS, Advance
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image import build_with
@@ -68,7 +69,7 @@ def _cells(name: str, run: StrongComparison) -> tuple[str, ...]:
         costs.append(f"{report.instructions_mean:.0f} / {report.instructions_longest:.0f}")
         equal = equal and report.differs_at(run.hashes) is None
         state = str(report.state_bytes) if state == "-" else state
-    return name, str(run.design.config.window), state, *costs, "equal" if equal else "DIFFERENT"
+    return name, str(run.design.config.window), state, *costs, "equal" if equal else DIFFERS
 
 
 @cache
@@ -135,19 +136,15 @@ static const int replay_config = 1000000;
 """
 
 
-def rows(names: Sequence[str], _: int, progress: Callable[[], object]) -> Iterator[tuple[str, ...]]:
+def rows(names: Sequence[str], _: int, advance: Advance) -> Iterator[tuple[str, ...]]:
     """Of HEADER."""
-    return _each(row_of, names, progress)
-
-
-def fixed_rows(names: Sequence[str], _: int, progress: Callable[[], object]) -> Iterator[tuple[str, ...]]:
-    """Of FIXED_HEADER."""
-    return _each(fixed_row_of, names, progress)
-
-
-def _each(
-    row: Callable[[str], tuple[str, ...]], names: Sequence[str], progress: Callable[[], object]
-) -> Iterator[tuple[str, ...]]:
     for name in names:
-        yield row(name)
-        progress()
+        yield row_of(name)
+        advance()
+
+
+def fixed_rows(names: Sequence[str], _: int, advance: Advance) -> Iterator[tuple[str, ...]]:
+    """Of FIXED_HEADER."""
+    for name in names:
+        yield fixed_row_of(name)
+        advance()

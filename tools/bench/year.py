@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.case import Advance, Report, counts
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board import board_of_guess
@@ -223,3 +224,19 @@ def _faults_of_page(log: Path) -> Iterator[str]:
         t = curve["t"]
         if not t or np.any(np.diff(t) < 0) or t[-1] == t[0]:
             yield f"the page's time axis of {curve['label']} does not go on"
+
+
+def report(on: str, core: Core, samples: int, out: Path, advance: Advance) -> Report:
+    """See bench.case."""
+    if out.exists():
+        raise PvidError(f"{out} exists")
+    rig = MechanismRig("kapitza", 1000.0, known={"l1": 0.3})
+    passages = tuple(range(1, 1 + passages_of_a_year(1000.0)))
+    year = emulated_year(on, passages, samples, out, rig, core, lambda _: advance())
+    numbers = (
+        ("passages of 2^32 ticks", year.passages),
+        ("samples verified", year.verdict.verified),
+        ("faults", len(year.faults)),
+    )
+    faults = [*year.faults, *([] if year.verdict.verified else ["no sample is verified"])]
+    return Report([counts(f"year-{core}", numbers)], faults, [year.verdict.text, year.account.text])

@@ -15,7 +15,7 @@ with contextlib.suppress(ImportError):
     resource = importlib.import_module("resource")
 
 MOST_ROWS = 50_000_000  # 14 hours at 1 kHz
-BYTES_A_ROW = 160  # of memory while a run is read and identified, measured: 140 (bench reading has the reader's part)
+BYTES_A_ROW = 160  # of memory while a run is read and identified, measured: 140
 _SHARE = 0.8  # of the memory
 
 
