@@ -32,8 +32,6 @@ from pvid.log.values import Values, tables_of
 from pvid.settings.enums import Reason
 
 TICKS = 4000
-MECHANISM = field_board.mechanism()
-TABLES = tables_of(MECHANISM)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +64,7 @@ def last_estimate(sent: list[tuple[int, link.Message]]) -> tuple[int, link.Estim
 
 
 def test_csv_reads_back_with_pandas(tmp_path: Path, log: Path, sent: list[tuple[int, link.Message]]) -> None:
-    paths = export_log(log, "csv", tmp_path / "out", MECHANISM)
+    paths = export_log(log, "csv", tmp_path / "out", field_board.mechanism())
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in paths)
     samples = pandas.read_csv(tmp_path / "out-samples.csv")
     first = samples[samples.segment == 0]
@@ -91,12 +89,12 @@ def test_csv_reads_back_with_pandas(tmp_path: Path, log: Path, sent: list[tuple[
 
 
 def test_parquet_reads_back_with_pyarrow(tmp_path: Path, log: Path) -> None:
-    export_log(log, "parquet", tmp_path / "out", MECHANISM)
+    export_log(log, "parquet", tmp_path / "out", field_board.mechanism())
     samples = pyarrow.parquet.read_table(tmp_path / "out-samples.parquet")
     first = samples.filter(pyarrow.compute.equal(samples["segment"], 0))
     got = np.stack([first["phi"].to_numpy(), first["y"].to_numpy()], axis=1)
     assert np.array_equal(got, expected_samples())
-    for table, columns in TABLES.items():
+    for table, columns in tables_of(field_board.mechanism()).items():
         schema = pyarrow.parquet.read_schema(tmp_path / f"out-{table}.parquet")
         assert {field.name: field.metadata[b"unit"].decode() for field in schema} == {
             name: column.unit for name, column in columns.items()
@@ -104,7 +102,7 @@ def test_parquet_reads_back_with_pyarrow(tmp_path: Path, log: Path) -> None:
 
 
 def test_npz_is_a_run_and_more(tmp_path: Path, log: Path) -> None:
-    (path,) = export_log(log, "npz", tmp_path / "out", MECHANISM)
+    (path,) = export_log(log, "npz", tmp_path / "out", field_board.mechanism())
     archive = np.load(path)
     units = json.loads(str(archive["units"]))
     assert set(units) == set(archive.files) - {"units"}
@@ -114,12 +112,14 @@ def test_npz_is_a_run_and_more(tmp_path: Path, log: Path) -> None:
 
 
 def test_mcap_reads_back_with_its_library(tmp_path: Path, log: Path, sent: list[tuple[int, link.Message]]) -> None:
-    (path,) = export_log(log, "mcap", tmp_path / "out", MECHANISM)
+    (path,) = export_log(log, "mcap", tmp_path / "out", field_board.mechanism())
     with path.open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
         assert summary is not None
-        assert {channel.topic for channel in summary.channels.values()} == {f"/{table}" for table in TABLES}
+        assert {channel.topic for channel in summary.channels.values()} == {
+            f"/{table}" for table in tables_of(field_board.mechanism())
+        }
         assert all(schema.encoding == "jsonschema" for schema in summary.schemas.values())
         described = {schema.name: json.loads(schema.data) for schema in summary.schemas.values()}
         assert described["pvid.samples"]["properties"]["phi"]["unit"] == "rad"
@@ -144,7 +144,7 @@ _JSON_KINDS = {"number": (int, float), "integer": (int,), "string": (str,)}
 def test_mcap_contains_the_fields_required_by_foxglove_and_plotjuggler(tmp_path: Path, log: Path) -> None:
     """By Foxglove's page on custom schema encodings: schema "jsonschema" of an object, messages "json", UTF-8, each an
     object; a plot's axis is the log time. Both programs read the summary first, and the chunks by their index."""
-    (path,) = export_log(log, "mcap", tmp_path / "out", MECHANISM)
+    (path,) = export_log(log, "mcap", tmp_path / "out", field_board.mechanism())
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
         assert summary is not None and summary.statistics is not None
@@ -152,7 +152,10 @@ def test_mcap_contains_the_fields_required_by_foxglove_and_plotjuggler(tmp_path:
         schemas = {number: json.loads(one.data) for number, one in summary.schemas.items()}
         assert all(one["type"] == "object" and one["properties"] for one in schemas.values())
         assert all(one.message_encoding == "json" for one in summary.channels.values())
-        assert (statistics.channel_count, statistics.schema_count) == (len(TABLES), len(TABLES))
+        assert (statistics.channel_count, statistics.schema_count) == (
+            len(tables_of(field_board.mechanism())),
+            len(tables_of(field_board.mechanism())),
+        )
         assert statistics.chunk_count == len(summary.chunk_indexes) > 0
         messages = [(channel, one) for _, channel, one in make_reader(file).iter_messages()]
     assert len(messages) == statistics.message_count == sum(statistics.channel_message_counts.values())
@@ -197,7 +200,7 @@ def test_fixed_point_is_exported_in_si() -> None:
     )
     raw = link.RawCount.of_values([4096, -2048], [1, 2])
     sent = [(0, hello), (0, configure), (0, raw), (2, estimate)]
-    values, stream = Values(MECHANISM), LogStream()
+    values, stream = Values(field_board.mechanism()), LogStream()
     rows = [one for r in stream.feed(b"".join(field_board.frames(sent))) for one in values.rows(r)]
     samples, estimates = rows
     assert samples.columns["phi"].tolist() == [1.0, -0.5]
@@ -250,9 +253,9 @@ def test_an_exported_segment_without_gaps_is_a_run(tmp_path: Path, log: Path) ->
     data = log.read_bytes()
     cut = data.index(b"the end")
     whole.write_bytes(data[: data.index(b"\0", cut) + 1])
-    (path,) = export_log(whole, "npz", tmp_path / "one", MECHANISM)
+    (path,) = export_log(whole, "npz", tmp_path / "one", field_board.mechanism())
     assert len(read_run(path, 1000.0)) == TICKS
-    export_log(whole, "csv", tmp_path / "one", MECHANISM)
+    export_log(whole, "csv", tmp_path / "one", field_board.mechanism())
     assert len(read_run(tmp_path / "one-samples.csv", 1000.0)) == TICKS
 
 
@@ -269,7 +272,7 @@ def listener() -> socket.socket:
 
 
 def teed(scheme: str, listener: socket.socket, sent: list[tuple[int, link.Message]]) -> list[bytes]:
-    tee = live_stream(f"{scheme}://127.0.0.1:{listener.getsockname()[1]}", MECHANISM)
+    tee = live_stream(f"{scheme}://127.0.0.1:{listener.getsockname()[1]}", field_board.mechanism())
     stream = LogStream()
     listener.settimeout(0)
     got = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import frexp
 from pathlib import Path
 from typing import Any
@@ -71,7 +71,7 @@ class PaperRun:
     def fixed_settings(self) -> dict[str, Any]:
         """Those of `Fixed`: formats in which the largest numbers of a clean run have 20 bits."""
         p_bits = [30 - frexp(x)[1] for x in FACTORS[1] * TRUTH]
-        y, n = (np.abs(x).max(0) for x in ROWS)
+        y, n = (np.abs(x).max(0) for x in rows())
         n_bits = [20 - frexp(x)[1] for x in n]
         y_bits = 20 - frexp(y)[1]
 
@@ -189,8 +189,16 @@ class KeepsRows(Single):
         return np.array(y, np.float64), np.array(n, np.float64)
 
 
-CLEAN = motion(5000, seed=1)
-ROWS = KeepsRows().after(PaperRun(CLEAN[:1000]).samples)
+@cache
+def clean() -> Counts:
+    """A run of 100 s."""
+    return motion(5000, seed=1)
+
+
+@cache
+def rows() -> Any:
+    """Of its first 20 s."""
+    return KeepsRows().after(PaperRun(clean()[:1000]).samples)
 
 
 MAIN = """

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from paper_run import (
-    CLEAN,
     HERE,
     MAIN,
     MISSING,
@@ -19,6 +18,7 @@ from paper_run import (
     TRUTH,
     KeepsRows,
     PaperRun,
+    clean,
     compile_with_core,
     replay_header,
 )
@@ -50,7 +50,7 @@ COMPILERS = {
 def wild_run(ticks: int) -> PaperRun:
     """The motion again and again with what happens to sensors: each is missing, dead, stuck at full scale or jumps."""
     random = np.random.default_rng(2)
-    counts = np.tile(CLEAN, (-(-ticks // len(CLEAN)), 1))[:ticks].astype(np.int64)
+    counts = np.tile(clean(), (-(-ticks // len(clean())), 1))[:ticks].astype(np.int64)
     for first in range(300, ticks, 700):
         channel, length = random.integers(2), random.integers(1, 60)
         part = counts[first : first + length, channel]
@@ -101,7 +101,7 @@ def law_5(y: npt.NDArray[np.float64], n: npt.NDArray[np.float64], begun: KeepsRo
 def test_law_5_by_hand_is_that_in_float64() -> None:
     """Rounding alone is between them: float32 has 6e-8, the condition of C^T M C is 160."""
     one, begun = KeepsRows(), KeepsRows()
-    y, n = one.after(PaperRun(CLEAN).samples)
+    y, n = one.after(PaperRun(clean()).samples)
     assert np.allclose(one.p, law_5(y, n, begun), rtol=1e-4)
     assert np.allclose(one.p, TRUTH, rtol=0.15) and not np.allclose(one.p, begun.p, rtol=0.05)
 
@@ -116,7 +116,7 @@ def test_other_compilers_keep_the_bits(core: Core, options: tuple[str, ...], tmp
 
 def test_fused_products_are_noticed(tmp_path: Path) -> None:
     """The comparison refutes what it is there to refute."""
-    run = PaperRun(CLEAN[:300])
+    run = PaperRun(clean()[:300])
     fused = run.on_core("f32", tmp_path, "gcc", "-march=haswell", "-ffp-contract=fast")
     assert not np.array_equal(run.by_hand("f32"), fused)
 

@@ -60,11 +60,11 @@ def _version(python: str) -> str | None:
 
 
 def interpreters() -> list[str]:
-    """Of the versions that pvid is for, those that this machine has."""
+    """Of the versions that pvid is for, those that this machine seems to have."""
     found = []
     for version in PYTHONS:
-        candidates = [shutil.which(f"python{version}"), *Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
-        found += [str(one) for one in candidates if one and _version(str(one)) == version][:1]
+        candidates = [*Path.home().glob(f".pyenv/versions/{version}.*/bin/python"), shutil.which(f"python{version}")]
+        found += [str(one) for one in candidates if one][:1]
     return found
 
 
@@ -149,15 +149,14 @@ FOUND = interpreters()
 @pytest.mark.night
 @pytest.mark.parametrize(
     "python",  # the oldest and the newest; those between them in the long form
-    [
-        pytest.param(one, id=f"python{_version(one)}", marks=pytest.mark.long if one in FOUND[1:-1] else ())
-        for one in FOUND
-    ],
+    [pytest.param(one, id=one, marks=pytest.mark.long if one in FOUND[1:-1] else ()) for one in FOUND],
 )
 def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel: Path, tmp_path: Path) -> None:
     """By pip, into an environment of its own that finds the dependencies in another one: for the version that the tests
     themselves run in, in theirs."""
     version = _version(python)
+    if version is None:
+        pytest.skip(f"{python} stands in for a version that is not here")
 
     def make(folder: Path) -> None:
         text = (ROOT / "host" / "pyproject.toml").read_text(encoding="utf-8")
