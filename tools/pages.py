@@ -42,6 +42,7 @@ NOT_EXECUTED = (
     (r"^\./tools/pvid log /dev/ttyACM0 \w+\.csv", "needs a board; tests/log/test_text_table.py has one that prints"),
     (r"^\./tools/pvid demo", "tests/cli/test_cli.py and test_demo_run.py execute it"),
     (r"--rig commission\.toml", "searches an excitation; tests/deploy/test_examples.py has its package"),
+    (r"^\./tools/pvid watch", "runs until Ctrl-C; tests/fleet/test_batch.py"),
     (r"^\./tools/pvid sizes", "builds every image; tests/board/test_targets.py measures some of them"),
     (r"^\./tools/(test|release)\b", "executes the tests themselves; tests/tools/test_release.py executes parts of it"),
     (r"^build/venv/bin/python tools/prove\.py", "takes minutes; tests/tools/test_proofs.py executes parts of it"),
@@ -63,6 +64,7 @@ SHORT = (
 )
 # ---- blocks that are neither commands nor programs: page, pattern of the first line, what they are and their test
 SHOWN = (
+    ("batch.md", r"changed: ", "what it prints; tests/fleet/test_changes.py"),
     ("theory.md", "", "equations; tests/oracle"),
     ("compiler.md", r"sum_j", "an equation"),
     ("compiler.md", r"cart\.py|I1, h1", "sentences; tests/model"),

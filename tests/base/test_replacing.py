@@ -12,7 +12,7 @@ from pvid.base import replacing
 from pvid.base.atomic_write import write_files, write_whole
 from pvid.base.errors import PvidError
 from pvid.cli.main import GROUPS, commands
-from pvid.fleet.summary import page
+from pvid.fleet.page import Fleet, page
 
 REFUSED = "is not replaced: pvid did not write it, or it was changed since"
 
@@ -153,12 +153,12 @@ def test_a_figure_replaces_figures_of_pvid_on_any_machine_and_nothing_else(
 
 
 def test_a_page_of_a_fleet_is_known_by_its_generator(tmp_path: Path, account: Path) -> None:
-    write_whole(tmp_path / "page.html", page([], "a"))
+    write_whole(tmp_path / "page.html", page(Fleet.of([]), "a"))
     forgotten(account)
-    write_whole(tmp_path / "page.html", page([], "b"))
+    write_whole(tmp_path / "page.html", page(Fleet.of([]), "b"))
     (tmp_path / "page.html").write_text("<p>mine</p>")
     with pytest.raises(PvidError, match=REFUSED):
-        write_whole(tmp_path / "page.html", page([], "c"))
+        write_whole(tmp_path / "page.html", page(Fleet.of([]), "c"))
 
 
 def test_generated_code_replaces_its_former_self_and_no_hand_written_file(tmp_path: Path, account: Path) -> None:

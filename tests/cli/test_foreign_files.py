@@ -66,6 +66,7 @@ NAMED = {  # with the rig file in the place of its own option
     "model build": ["model", "build", "dc_motor", "--rig", "FILE", "-o", "built"],
     "deploy": ["deploy", "dc_motor", "--rig", "FILE", "-o", "deployed", "--for", "arduino"],
 }
+AS_BATCH = {"watch"}  # the same code, until Ctrl-C
 READ_NO_FILES = {"demo", "look", "simulate", "ports", "sizes", "schema", "tables", "models", "bench"}
 
 
@@ -117,7 +118,7 @@ def filled(folder: Path, command: list[str], file: str) -> list[str]:
 
 def test_every_command_is_tried() -> None:
     tried = {one[0] for table in (OF_A_RUN, OF_A_LOG, WITH_A_MODEL, NAMED) for one in table.values()}
-    assert tried | READ_NO_FILES == {name for group in GROUPS.values() for name in group}
+    assert tried | AS_BATCH | READ_NO_FILES == {name for group in GROUPS.values() for name in group}
 
 
 @pytest.mark.parametrize("name", OF_A_RUN)

@@ -17,22 +17,22 @@ import pyarrow.parquet
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT
+from fleet_rows import row
 from own_mechanisms import OWN, own_recording
 from pendulum_plant import simulate, standard_sensors
 from program import pvid
 
 from pvid.base.cluster import _distributed
-from pvid.base.console import DONE
+from pvid.base.console import CHANGED, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.cli.batch import command
 from pvid.cli.main import commands
 from pvid.fleet import run as fleet
+from pvid.fleet.page import Fleet
 from pvid.fleet.row import EQUAL, Question, Row, row_of
 from pvid.fleet.store import Store, read_rows
-from pvid.fleet.summary import counts_of, drifts_of, page
 
 LOG = ROOT / "tests" / "data" / "logs" / "two_samples.pvlog"
-DAY = 86400.0
 
 
 @pytest.fixture(scope="module")
@@ -149,33 +149,6 @@ def test_what_is_not_there_has_a_row_too(tmp_path: Path) -> None:
     assert row.failure is not None and "No such file" in row.failure and row.identified is None
 
 
-def row(board: str, day: float, value: float, se: float = 0.01, **other: Any) -> Row:
-    made = Row(f"{board}{day}", f"{board}/{day}", board, day * DAY, 100, True, "good", "good")
-    return replace(made, parameters={"g": (value, se, "m/s^2")}, **other)
-
-
-def test_a_drift_is_named_and_chance_is_not() -> None:
-    noise = np.random.default_rng(1).normal(0, 0.01, (2, 30))
-    still = [row("still", k, 9.5 + noise[0, k]) for k in range(30)]
-    moving = [row("moving", k, 9.5 + 0.002 * k + noise[1, k]) for k in range(30)]
-    doubted = [row("still", 99, 20.0, warning="no")]
-    a, b = drifts_of([*still, *moving, *doubted])
-    assert not a.drifts and a.recordings == 30 and abs(a.mean - 9.5) < 4 * a.se
-    assert b.drifts and b.slope is not None and b.slope_se is not None and abs(b.slope - 0.002) < 4 * b.slope_se
-    assert a.scatter is not None and 0.5 < a.scatter < 1.7
-    text = page([*still, *moving, *doubted], "<fleet>")
-    marked = '<strong class="bad">moving</strong>'
-    assert text.count(marked) == 1 and "&lt;fleet&gt;" in text and "http:" not in text.split("<svg")[0]
-
-
-def test_scale_that_a_board_has_in_common_hides_no_drift() -> None:
-    """Errors of 0.3, of which 0.01 are apart: 0.06 in a month is beyond chance."""
-    noise = np.random.default_rng(1).normal(0, 0.01, 30)
-    moving = [row("moving", k, 9.5 + 0.002 * k + noise[k], 0.3) for k in range(30)]
-    assert not drifts_of(moving)[0].drifts
-    assert drifts_of([replace(one, se_apart={"g": 0.01}) for one in moving])[0].drifts
-
-
 def test_a_report_of_each_recording_is_linked_and_written_again_where_it_is_gone(
     tmp_path: Path, inline: list[str]
 ) -> None:
@@ -207,7 +180,7 @@ def test_outcomes_are_counted() -> None:
         replace(good, failure="f", verdict=None, identified=None),
     ]
     rows += [replace(good, verified=EQUAL), replace(good, verified="DIFFERENT at p")]
-    assert counts_of(rows) == {
+    assert Fleet.of(rows).counts == {
         "good": 3,
         "usable": 1,
         "not_identified": 1,
@@ -282,3 +255,48 @@ def test_a_folder_with_a_new_recording_is_identified_again(tmp_path: Path) -> No
 def test_own_parameters_need_recordings_together(tmp_path: Path) -> None:
     refused = CliRunner().invoke(command, ["x.csv", "-o", str(tmp_path / "f.parquet"), "--own", "m"])
     assert isinstance(refused.exception, PvidError) and "--together" in str(refused.exception)
+
+
+def test_a_folder_is_watched(tmp_path: Path, inline: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A recording is taken once it is whole, each once; one more jumps: said, and the exit code at the end."""
+    folder, out = tmp_path / "runs", tmp_path / "runs" / "rows.parquet"
+    folder.mkdir()
+
+    def work(_: Any, work: object, items: list[str], question: Question) -> Iterator[Row]:
+        for item in items:
+            inline.append(Path(item).name)
+            size, value = len(Path(item).read_text()), float(Path(item).stem)
+            made = row("b", value, 9.5 if value < 6 else 10.5)
+            yield replace(made, key=question.key(Path(item)), path=item, samples=size)
+
+    def wait(_: float) -> None:
+        for action in rounds.pop(0):
+            action()
+
+    def write(name: str, text: str) -> Callable[[], object]:
+        return lambda: (folder / name).write_text(text)
+
+    def end() -> None:
+        raise KeyboardInterrupt
+
+    rounds: list[list[Callable[[], object]]] = [[write(f"{k}.csv", "t") for k in range(6)], []]
+    rounds += [[write("6.csv", "t")], [write("6.csv", "t,V")], [], [end]]
+    monkeypatch.setattr(fleet, "each", work)
+    monkeypatch.setattr("pvid.cli.batch.time.sleep", wait)
+    done = CliRunner().invoke(commands, ["watch", str(folder), "-o", str(out)], standalone_mode=False)
+    assert done.return_value == CHANGED, done.exception
+    assert inline == [f"{k}.csv" for k in range(7)] and read_rows(out)[-1].samples == 3
+    assert done.stdout.count("changed: b: g rose by 11 % (9.50 to 10.50 m/s^2) between 6 and 7 January 1970") == 1
+    assert 'http-equiv="refresh" content="10"' in out.with_suffix(".html").read_text()
+
+
+def test_a_folder_without_recordings_is_watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def end(_: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pvid.cli.batch.time.sleep", end)
+    words = ["watch", str(tmp_path), "-o", str(tmp_path / "rows.parquet")]
+    done = CliRunner().invoke(commands, words, standalone_mode=False)
+    assert done.return_value == NOTHING_IDENTIFIED and "no recording came" in done.stdout
+    nowhere = CliRunner().invoke(commands, [*words[:1], str(tmp_path / "nowhere"), *words[2:]], standalone_mode=False)
+    assert isinstance(nowhere.exception, PvidError) and "no such folder" in str(nowhere.exception)

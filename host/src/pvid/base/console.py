@@ -11,7 +11,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from pvid.base.wording import printable
 
-DONE, DIFFERENT, BAD_INPUT, NOTHING_IDENTIFIED = 0, 1, 2, 3
+DONE, DIFFERENT, BAD_INPUT, NOTHING_IDENTIFIED, CHANGED = 0, 1, 2, 3, 4
 OWN_ERROR = 70  # EX_SOFTWARE of sysexits.h
 INTERRUPTED = 130
 

@@ -1,8 +1,8 @@
 """The command line: `./tools/pvid COMMAND`.
 
 Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, or output that cannot be written (one sentence),
-3 nothing identified, 70 an error of pvid's own (a report is written), 130 interrupted, 141 the output was closed by its
-reader.
+3 nothing identified, 4 a parameter of a fleet changed, 70 an error of pvid's own (a report is written), 130
+interrupted, 141 the output was closed by its reader.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "validate": "Say how well an answer predicts another run.",
         "tune": "Show the designs of the weak form for a recorded run.",
         "plot": "Draw a report of a log or a run.",
-        "batch": "Identify many runs and logs in parallel; one row each, and a page of drifts.",
+        "batch": "Identify many runs and logs in parallel; one row each, and a page of what changed.",
+        "watch": "Identify the recordings of a folder as they come, and say what changed.",
     },
     "Boards": {
         "log": "Record a board's samples and estimates.",
@@ -63,6 +64,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
 _ELSEWHERE = {
     "schema": ("pvid.cli.tables", "schema"),
     "bench": ("bench.command", "bench"),
+    "watch": ("pvid.cli.batch", "watch"),
 }
 _IN_A_CLONE = ("bench",)
 # Packages that not every installation has, with the extra of pvid that brings them.

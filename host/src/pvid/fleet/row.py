@@ -15,6 +15,7 @@ from pvid.base.errors import PvidError
 from pvid.base.version import __version__
 from pvid.base.wording import reason
 from pvid.board.mechanism_board import board_of
+from pvid.fleet.dates import began_of
 from pvid.log.file import Segment
 from pvid.log.reader import LogReader
 from pvid.log.rig import LOG_SUFFIX, hello_of_log, settings_text_of_log
@@ -75,7 +76,8 @@ class Row:
     key : of its content and the question
     path : as it was given; of recordings that are identified together their folder
     board : USB serial number of the board that sent a log, else its name and folder; of a run its folder
-    began : seconds since 1970 of a log's first segment; of a run the time of its file
+    began : seconds since 1970
+    dated : what says so: "log", "recording", "name" or, of a run without a date, "file"
     samples : that were identified
     identified, verdict, status, warning : as in pvid.Result; None where the recording was refused
     verified : of a log: EQUAL, or the first difference, or why it was not; None: not asked, or no log
@@ -84,6 +86,7 @@ class Row:
     took : seconds of work
     predicted : R^2 of the worst predicted sensor, of motion that was not fitted; None: it was not looked at
     se_apart : name -> standard error without the part of scale, which recordings of one rig have in common
+    se_noise : name -> standard error by noise alone
     report : its report; None: none was asked for
     """
 
@@ -103,6 +106,8 @@ class Row:
     predicted: float | None = None
     se_apart: Mapping[str, float] = field(default_factory=dict)
     report: str | None = None
+    se_noise: Mapping[str, float] = field(default_factory=dict)
+    dated: str = "file"
 
 
 def row_of(given: str | tuple[str, ...], question: Question) -> Row:
@@ -115,7 +120,7 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
     key = ""
     try:
         key = question.key(*places)
-        board, began = _origin(place)
+        board, began, dated = _origin(place)
     except (OSError, PvidError) as error:
         return Row(key, path, str(place.parent), 0.0, failure=_told(error), took=time.monotonic() - start)
     try:
@@ -131,7 +136,7 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
         )
         report = None if question.reports is None else _reported(result, question.reports, Path(path), key)
     except (PvidError, OSError) as error:
-        return Row(key, path, board, began, failure=_told(error), took=time.monotonic() - start)
+        return Row(key, path, board, began, dated=dated, failure=_told(error), took=time.monotonic() - start)
     return Row(
         key,
         path,
@@ -147,7 +152,9 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
         took=time.monotonic() - start,
         predicted=min((one["r2"] for one in result.details.get("prediction", {}).values()), default=None),
         se_apart={name: result.se_apart(name) for name in result.parameters},
+        se_noise={name: se for name in result.parameters if (se := result.details["parameters"][name].get("se_noise"))},
         report=report,
+        dated=dated,
     )
 
 
@@ -160,21 +167,19 @@ def _told(error: OSError | PvidError) -> str:
     return reason(error) if isinstance(error, OSError) else str(error)
 
 
-def _origin(path: Path) -> tuple[str, float]:
-    """The board, and when it began."""
+def _origin(path: Path) -> tuple[str, float, str]:
+    """The board, when it began, and what says so."""
     if path.suffix != LOG_SUFFIX:
-        return str(path.parent), path.stat().st_mtime
-    began, serial = path.stat().st_mtime, ""
+        return str(path.parent), *began_of(path)
+    began, dated, serial = path.stat().st_mtime, "file", ""
     for record in LogReader(path):
         if isinstance(record.item, Segment):
             usb = record.item.description.get("usb")
             serial = str(usb.get("serial") or "") if isinstance(usb, dict) else ""
-            began = record.item.unix_ns * _NS
+            began, dated = record.item.unix_ns * _NS, "log"
             break
-    if serial:
-        return serial, began
-    hello = hello_of_log(path)
-    return (f"{hello.board} in {path.parent}" if hello is not None else str(path.parent)), began
+    hello = None if serial else hello_of_log(path)
+    return serial or (str(path.parent) if hello is None else f"{hello.board} in {path.parent}"), began, dated
 
 
 def _all_verified(paths: Sequence[Path], question: Question) -> str | None:

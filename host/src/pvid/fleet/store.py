@@ -16,10 +16,10 @@ from pvid.base.json_lines import append_json_line, read_json_lines
 from pvid.base.wording import in_utf8
 from pvid.fleet.row import Row
 
-_PARAMETERS, _APART = "parameters", "se_apart"
 _SE = "_se"
-_SE_APART = f"_{_APART}"
-_FIXED = tuple(one.name for one in fields(Row) if one.name not in (_PARAMETERS, _APART))
+_PARTS = ("se_apart", "se_noise")  # of the error, a column each behind the value's name
+_FIXED = tuple(one.name for one in fields(Row) if one.name not in ("parameters", *_PARTS))
+_NEWER = {"predicted", "report", "dated"}  # which older files do not have
 
 
 class Store:
@@ -50,7 +50,7 @@ class Store:
         """What the partial file contains."""
         for found in read_json_lines(self.partial):
             try:
-                found[_PARAMETERS] = {name: tuple(one) for name, one in found[_PARAMETERS].items()}
+                found["parameters"] = {name: tuple(one) for name, one in found["parameters"].items()}
                 yield Row(**found)
             except (TypeError, KeyError, AttributeError):
                 continue
@@ -88,9 +88,8 @@ class Store:
         schema = [arrow.field(name, kinds.get(name, arrow.string())) for name in _FIXED]
         for name, unit in units.items():
             about = {b"unit": unit.encode()}
-            schema += [
-                arrow.field(one, arrow.float64(), metadata=about) for one in (name, name + _SE, name + _SE_APART)
-            ]
+            columns = (name, name + _SE, *(f"{name}_{part}" for part in _PARTS))
+            schema += [arrow.field(one, arrow.float64(), metadata=about) for one in columns]
         table = arrow.Table.from_pylist([_flat(row) for row in found], schema=arrow.schema(schema))
         try:
             with appearing(self.out, freely=True) as unfinished:
@@ -103,7 +102,7 @@ class Store:
 def _flat(row: Row) -> Mapping[str, Any]:
     flat = {name: in_utf8(one) if isinstance(one := getattr(row, name), str) else one for name in _FIXED}
     for name, (value, se, _) in row.parameters.items():
-        flat |= {name: value, name + _SE: se, name + _SE_APART: row.se_apart.get(name)}
+        flat |= {name: value, name + _SE: se} | {f"{name}_{part}": getattr(row, part).get(name) for part in _PARTS}
     return flat
 
 
@@ -122,18 +121,18 @@ def read_rows(path: Path) -> list[Row]:
         table = parquet.read_table(path)
     except Exception as error:  # pyarrow's own kinds, which cannot be named without importing it
         raise PvidError(f"{path}: exists and is not a Parquet file: choose another name for -o") from error
-    if not set(_FIXED) - {"predicted", "report"} <= set(table.column_names):  # which older files do not have
+    if not set(_FIXED) - _NEWER <= set(table.column_names):
         raise PvidError(f"{path}: exists and was not written by pvid batch: choose another name for -o")
     names = [name for name in table.column_names if name not in _FIXED and name + _SE in table.column_names]
     units = {name: (table.schema.field(name).metadata or {}).get(b"unit", b"").decode() for name in names}
-    return [
-        Row(
-            **{name: one.get(name) for name in _FIXED},
-            parameters={name: (one[name], one[name + _SE], units[name]) for name in names if one[name] is not None},
-            se_apart={name: se for name in names if (se := one.get(name + _SE_APART)) is not None},
-        )
-        for one in table.to_pylist()
-    ]
+    rows = []
+    for one in table.to_pylist():
+        own = {name: one[name] for name in _FIXED if name in one}
+        own["parameters"] = {name: (one[name], one[name + _SE], units[name]) for name in names if one[name] is not None}
+        for part in _PARTS:
+            own[part] = {name: se for name in names if (se := one.get(f"{name}_{part}")) is not None}
+        rows.append(Row(**own))
+    return rows
 
 
 def _arrow() -> tuple[Any, Any]:

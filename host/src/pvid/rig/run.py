@@ -394,6 +394,7 @@ _READERS: dict[str, Callable[[Path, Columns], Table]] = {
     **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
     ".mcap": read_mcap,
 }
+SUFFIXES = tuple(_READERS)
 # How other kinds of files become one of these.
 _CONVERTED = {
     ".bag": "ROS 1: `mcap convert RUN.bag RUN.mcap`",

@@ -92,18 +92,20 @@ def picture(draw: Callable[[Figure], None], height: float, caption: str, name: s
     return f'<figure role="img" aria-label="{label}">{svg}<figcaption>{caption}</figcaption></figure>'
 
 
-def document(title: str, body: str) -> str:
+def document(title: str, body: str, *, refresh: int = 0) -> str:
     """The whole page.
 
     Parameters
     ----------
     title : text, of anybody
     body : in HTML
+    refresh : seconds after which a browser loads it again; 0: never
     """
+    again = f'<meta http-equiv="refresh" content="{refresh}">' if refresh else ""
     head = (
         f'<meta charset="utf-8"><meta name="generator" content="{CREATOR}">'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<meta name="color-scheme" content="light dark"><title>{text(title)}</title><style>{STYLE}</style>'
+        f'<meta name="color-scheme" content="light dark">{again}<title>{text(title)}</title><style>{STYLE}</style>'
     )
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body><main>{body}</main></body></html>\n'

@@ -1,0 +1,112 @@
+"""What changed in a fleet: found beyond chance, named with its date, not hidden by warnings or by errors of scale."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from fleet_rows import DAY, row
+
+from pvid.fleet.changes import FALSE_ALARMS, Change, Series
+from pvid.fleet.dates import began_of
+from pvid.fleet.page import Fleet, page, sentence
+from pvid.fleet.row import Row
+
+NOISE = 0.01
+
+
+def series(value: npt.NDArray[np.float64], chance: float = FALSE_ALARMS, apart: float = 0.05) -> Series:
+    n = value.size
+    return Series("b", "R", "ohm", DAY * np.arange(float(n)), value, np.full(n, NOISE), np.full(n, apart), chance)
+
+
+@pytest.mark.parametrize("scatter", [1.0, 3.0])  # of what the noise says
+@pytest.mark.parametrize("n", [4, 6, 30])
+def test_chance_is_named_as_often_as_stated(n: int, scatter: float) -> None:
+    draws = np.random.default_rng(n).normal(10, NOISE * scatter, (600, n))
+    assert np.mean([bool(series(one).changes) for one in draws]) <= 1.5 * FALSE_ALARMS
+
+
+@pytest.mark.parametrize("n", [6, 30])
+@pytest.mark.parametrize("kind", ["step", "last", "trend", "bump"])
+def test_a_change_is_found_where_it_is(kind: str, n: int) -> None:
+    """Of a hundred times the noise, from the middle on, in the last recording, over all and in one alone; errors of the
+    model five times the noise, which all recordings share, do not hide it."""
+    k = np.arange(n)
+    shape = {"step": k >= n // 2, "last": k == n - 1, "trend": k / (n - 1), "bump": k == n // 2}[kind]
+    steps = {"step": [n // 2], "last": [n - 1], "trend": [0], "bump": [n // 2, n // 2 + 1]}[kind]
+    for seed in range(20):
+        found = series(10 + shape + np.random.default_rng(seed).normal(0, NOISE, n), FALSE_ALARMS / 30).changes
+        assert [one.kind for one in found] == ["trend" if kind == "trend" else "step"] * len(steps)
+        assert [one.end for one in found] == ([DAY * (n - 1)] if kind == "trend" else [DAY * one for one in steps])
+        assert abs(abs(found[0].part) - 0.1) < 0.004
+
+
+def test_two_recordings_are_compared_with_all_but_scale() -> None:
+    assert not series(np.array([10.0, 10.25])).changes
+    (one,) = series(np.array([10.0, 10.5])).changes
+    assert one == Change("step", 0.0, DAY, 10.0, 10.5)
+
+
+def test_the_mean_is_since_the_last_step_and_not_below_what_recordings_share() -> None:
+    value = np.where(np.arange(20) < 12, 10.0, 11.0) + np.random.default_rng(1).normal(0, NOISE, 20)
+    mean, se = series(value).mean
+    assert abs(mean - 11) < 4 * NOISE / 8**0.5 and 0.048 < se < 0.051
+    assert series(value, apart=NOISE).mean[1] < 2 * NOISE / 8**0.5
+
+
+def fleet(**other: Any) -> list[Row]:
+    """Two boards over ten days: one stays, of the other g falls by 2 %; errors of scale are 3 %."""
+    noise = np.random.default_rng(1).normal(0, 0.001, (2, 10))
+    apart = {"se_apart": {"g": 0.002}, "se_noise": {"g": 0.001}, **other}
+    still = [row("motors/still", k + 1, 9.5 + noise[0, k], 0.3, **apart) for k in range(10)]
+    return still + [row("motors/moving", k + 1, 9.5 - 0.19 * k / 9 + noise[1, k], 0.3, **apart) for k in range(10)]
+
+
+@pytest.mark.parametrize("warning", [None, "phi is late by 2.1e-05 s"])
+def test_the_page_says_what_changed_with_warnings_or_without(warning: str | None) -> None:
+    found = Fleet.of(fleet(warning=warning))
+    (alarm,) = found.changes(alarms=True)
+    words = "moving: g fell by 2 % (9.500 to 9.310 m/s^2) steadily from 2 to 11 January 1970"
+    assert sentence(*alarm) == words and found.title == "Fleet of 2 boards, 2 to 11 January 1970"
+    text = page(found, "pvid batch <all>")
+    assert f'<strong class="bad">{words}</strong>' in text and "pvid batch &lt;all&gt;" in text
+    assert "g 3.2 %" in text and ("2.1e-05 s (alike in 20 of 20 recordings)" in text) == (warning is not None)
+    assert text.count("as of all") == (20 if warning else 0) and "http:" not in text.split("<svg")[0]
+    assert "refresh" not in text and 'http-equiv="refresh" content="7"' in page(found, "", refresh=7)
+
+
+def test_a_small_change_is_told_and_is_no_alarm() -> None:
+    found = Fleet.of(fleet(), alarm=0.05)
+    assert not found.changes(alarms=True) and len(found.changes(alarms=False)) == 1
+    text = page(found, "")
+    assert "No parameter changed by 5 % or more" in text and "1 smaller change, beyond chance" in text
+
+
+def test_a_fleet_in_which_nothing_was_identified_has_a_page() -> None:
+    text = page(Fleet.of([Row("k", "a.csv", "a", 0.0, failure="it is <empty>")]), "")
+    assert "it is &lt;empty&gt;" in text and "<svg" not in text and "1 failed" in text
+
+
+DATES = {
+    "t,V\n2026-11-03T10:20:30.5,1\n": ("x.csv", "recording", 1793701230),
+    "# Date: 2026/11/03 10:20\nt,V\n0,1\n": ("x.csv", "recording", 1793701200),
+    "t;V\n1793701230.25;1\n": ("x.csv", "recording", 1793701230),
+    "t,V\n1793701230250,1\n": ("x.csv", "recording", 1793701230),
+    "t,V\n0.0,1\n": ("run_20261103-1020.csv", "name", 1793701200),
+    "t,V\n0.001,1\n": ("run-2026-13-03.csv", "file", 1000),
+    "t,V\n0.002,12345678901234\n": ("r 20260230.csv", "file", 1000),
+}
+
+
+@pytest.mark.parametrize("text", DATES)
+def test_a_recording_says_when_it_began(tmp_path: Path, text: str) -> None:
+    name, by, seconds = DATES[text]
+    path = tmp_path / name
+    path.write_text(text)
+    os.utime(path, (1000, 1000))
+    assert began_of(path) == (seconds, by)
