@@ -29,6 +29,11 @@ class Report:
     said: Sequence[str] = ()
 
 
+def columns(text: str) -> tuple[str, ...]:
+    """A header, of headings between bars."""
+    return tuple(one.strip() for one in text.split(" | "))
+
+
 def counts(name: str, numbers: Iterable[tuple[str, int]]) -> Table:
     """The table of one run: what was counted, and the number."""
     return name, ("what", "number"), [(what, str(number)) for what, number in numbers]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bench.case import Advance, Table
+from bench.case import Advance, Table, columns
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
@@ -30,33 +30,13 @@ CLOSE = 0.05  # "within 5 %"
 WRONG = 4.0  # standard errors: an error above is not covered
 
 ACCURACY = ("mechanism", "parameter", "bound %", "RMS %", "RMS / bound", "mean error %", "RMS / s.e.", "in 2 s.e. %")
-SUMMARY = (
-    "mechanism",
-    "friction",
-    "chi2",
-    "within 5 % after s: median",
-    "longest",
-    "warnings",
-    "s to identify",
+SUMMARY = columns("mechanism | friction | chi2 | within 5 % after s: median | longest | warnings | s to identify")
+TWO_WINDOWS = columns(
+    "mechanism | friction | parameter | runs beyond 5 % | RMS error there % | s.e. of two windows % | bound of "
+    "two windows %"
 )
-TWO_WINDOWS = (
-    "mechanism",
-    "friction",
-    "parameter",
-    "runs beyond 5 %",
-    "RMS error there %",
-    "s.e. of two windows %",
-    "bound of two windows %",
-)
-IMPERFECT = (
-    "mechanism",
-    "imperfection",
-    "largest error: of",
-    "%",
-    "in s.e.",
-    "chi2",
-    "warnings",
-    "wrong without a warning",
+IMPERFECT = columns(
+    "mechanism | imperfection | largest error: of | % | in s.e. | chi2 | warnings | wrong without a warning"
 )
 
 

@@ -27,7 +27,7 @@ import numpy as np
 from sympy.core.cache import clear_cache
 
 from bench import senseless_models
-from bench.case import Advance, Report, Table
+from bench.case import Advance, Report, Table, columns
 from bench.random_motion import RandomRun, random_run
 from bench.random_rigs import random_rig
 from pvid.base.errors import PvidError
@@ -61,18 +61,9 @@ from pvid.settings.enums import Core
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 
-HEADER = (
-    "kind",
-    "rigs",
-    "failures",
-    "good",
-    "warning",
-    "not identified",
-    "refused",
-    "median error [s.e.]",
-    "largest of good",
-    "second stage in C",
-    "fixed point",
+HEADER = columns(
+    "kind | rigs | failures | good | warning | not identified | refused | median error [s.e.] | largest of good |"
+    " second stage in C | fixed point"
 )
 COMPILE_HEADER = ("mechanism", "theta", "unknowns", "compiled in [s]", "judged in [s]")
 
