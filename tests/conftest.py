@@ -7,14 +7,17 @@ import os
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
 from pendulum_plant import Simulation, simulate, standard_sensors
 from processes import children_of
 
+from bench.kinds import KINDS
 from pvid.base.freed_memory import keep_freed
 from pvid.core.native import Native
+from pvid.models.mechanisms import names
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -48,6 +51,10 @@ SLOW = """
     bench/hard bench/verifying log/export log/text_table core/dead_zone tools/mutate bench/model_boards
     deploy/deploy_avr identification/skew bench/build_choices
 """.split()
+# Of tests of every mechanism in bench.kinds those of these four: relaxations, an integral, an algebraic output; corners
+# and dry friction; an input that is a derivative; a hidden coordinate of order two. The others are tests of the night.
+BY_DAY = ("battery_2rc", "dc_motor", "kapitza", "two_mass_drive")
+_NONE = SimpleNamespace(params={})
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")
 
@@ -76,8 +83,22 @@ def ticks(request: pytest.FixtureRequest) -> int:
     return length
 
 
+def of_night(items: list[pytest.Item]) -> Iterator[pytest.Item]:
+    """Of tests of the mechanisms of KINDS those that are not in BY_DAY; a light test takes all mechanisms there are."""
+    swept: dict[tuple[str, str], list[tuple[str, pytest.Item]]] = {}
+    for item in items:
+        for argument, value in getattr(item, "callspec", _NONE).params.items():
+            if isinstance(value, str):
+                swept.setdefault((item.nodeid.partition("[")[0], argument), []).append((value, item))
+    for cases in swept.values():
+        if {*KINDS} <= {value for value, _ in cases} and not {*names()} <= {value for value, _ in cases}:
+            yield from (item for value, item in cases if value in {*KINDS} - {*BY_DAY})
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Puts the longest files first; within a file, and among the others, nothing moves."""
+    for item in of_night(items):
+        item.add_marker(pytest.mark.night)
     if not config.getoption("--long"):
         left_out = [item for item in items if item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=left_out)

@@ -116,7 +116,9 @@ def start_by(monkeypatch: pytest.MonkeyPatch, script: Path, prefix: str) -> None
     monkeypatch.setattr(target, "build_image", build)
 
 
-@pytest.mark.parametrize(("form", "core"), KINDS)
+@pytest.mark.parametrize(
+    ("form", "core"), [KINDS[0], *(pytest.param(*one, marks=pytest.mark.night) for one in KINDS[1:])]
+)
 def test_the_stream_program_reads_nothing_that_was_not_written(
     form: str, core: str, native: Native, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,7 +132,7 @@ def test_the_stream_program_reads_nothing_that_was_not_written(
     assert verdict.equal, verdict.text
 
 
-@pytest.mark.parametrize(("form", "core"), [("weak", "f32"), ("strong", "q31")])
+@pytest.mark.parametrize(("form", "core"), [("weak", "f32"), pytest.param("strong", "q31", marks=pytest.mark.night)])
 def test_the_stream_program_is_clean_under_the_sanitizers(
     form: str, core: str, native: Native, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
