@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.case import Advance, Report, columns
-from bench.kept_recordings import KEPT
-from bench.recordings import MECHANISMS, PIECES, SOURCES, Source, write_source
+from bench.recordings import KEPT, MECHANISMS, PIECES, SOURCES, Source, write_source
 from bench.replay import Match, Replay
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.design import WeakDesign
