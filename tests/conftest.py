@@ -33,8 +33,8 @@ SLOW = """
     cli/cli cli/identify_in_c cli/identify_run oracle/missing identification/refined_search bench/random_models
     log/log show/page twin/weak_q31 identification/work board/memory identification/mechanism_advice
     codegen/strong_model cli/design_cost paper/paper cli/run_input bench/refine_mechanisms show/answer_figure
-    show/report board/stream bench/attack identification/refined_answer identification/refined_kinds oracle/samples
-    board/ports
+    show/report board/stream bench/attack cli/look deploy/commission identification/refined_answer identification/refined_kinds oracle/samples
+    board/ports board/profile core/standard_errors identification/refined_kernel base/subprocesses
     identification/additions deploy/deploy twin/weak_f32 codegen/build bench/liar cli/demo_run identification/judge
     tools/pages core/trust_q31 cli/api identification/scale_errors board/targets identification/own_mechanisms
     core/core_q31 identification/refined twin/second_stage show/view board/refined_board tools/wheel
@@ -49,7 +49,8 @@ SLOW = """
     identification/wild_samples board/port bench/strong_mechanisms cli/output tools/proofs log/untrusted
     show/pictures tools/loops oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random
     bench/hard bench/verifying log/export log/text_table core/dead_zone tools/mutate bench/model_boards
-    deploy/deploy_avr identification/skew bench/build_choices
+    deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
+    design/differentiation identification/following codegen/fitted_sizes identification/gallery bench/cell
 """.split()
 # Of tests of every mechanism in bench.kinds those of these four: relaxations, an integral, an algebraic output; corners
 # and dry friction; an input that is a derivative; a hidden coordinate of order two. The others are tests of the night.
