@@ -10,12 +10,12 @@ import pytest
 from conftest import ROOT
 
 from bench import claims
-from bench.case import Case
+from bench.case import Case, counts
 from bench.command import CASES
 from bench.figures import DATA, IMAGES, PAGE, PARTS, Part, results_of
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import table_in
-from pvid.cli.results import Results, put_counts, put_results, read_results
+from pvid.cli.results import Results, put_results, read_results
 
 sys.path.insert(0, str(ROOT / "tools"))
 
@@ -94,7 +94,7 @@ def test_what_was_written_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_without_a_folder_a_table_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    put_counts(None, "a", (("runs", 3),))
+    put_results(None, *counts("a", [("runs", 3)]))
     assert capsys.readouterr().out == "| what | number |\n|---|---|\n| runs | 3 |\n"
 
 

@@ -82,12 +82,14 @@ def play_hostile(library: Path, compiler: Path, *arguments: str) -> subprocess.C
     )
 
 
+@pytest.mark.night
 def test_hostile_runs_of_the_library_are_clean(library: Path, compiler: Path) -> None:
     done = play_hostile(library, compiler)
     assert done.returncode == 0, done.stderr[-5000:]
     assert int(done.stdout.split()[0]) > 230_000
 
 
+@pytest.mark.night
 def test_write_behind_an_array_is_found(library: Path, compiler: Path) -> None:
     done = play_hostile(library, compiler, "--planted")
     assert done.returncode != 0
