@@ -43,7 +43,7 @@ SLOW = """
     board/strong_image cli/several board/mechanism_board board/field core/read_while_stepping cli/foreign_files
     identification/several_recordings fleet/batch board/refined_stream codegen/generated_q31 bench/mechanisms
     cli/readme log/verify log/witness oracle/weak_in_c board/weak_boards core/weak_rows_q31 core/arithmetic_options
-    codegen/weak_c core/recorded_hashes codegen/model_q31 oracle/feedback codegen/generated_f32 oracle/weak_identify
+    codegen/weak_c core/recorded_hashes oracle/feedback codegen/generated_f32 oracle/weak_identify
     bench/accidents core/sizes_agree twin/state bench/year tools/notebooks oracle/corners model/elimination
     twin/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
     twin/runs_begin oracle/scale identification/refined_length board/generated twin/refinement codegen/refine

@@ -83,6 +83,7 @@ class Pair:
         assert self.core.state.information.rounding == self.twin.state.information.rounding
 
 
+@pytest.mark.by_day(6)
 @pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS.keys())
 @pytest.mark.parametrize("kind_end", KINDS.values(), ids=KINDS.keys())
 def test_core_and_twin_have_the_same_bits(native: Native, kind_end: tuple[int, ...], fields: dict[str, object]) -> None:

@@ -97,6 +97,7 @@ class Pair:
         assert self.core.state.information.exponent == self.twin.state.information.exponent
 
 
+@pytest.mark.by_day(6)
 @pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS.keys())
 @pytest.mark.parametrize("kind_end", KINDS.values(), ids=KINDS.keys())
 def test_core_and_twin_have_the_same_integers(

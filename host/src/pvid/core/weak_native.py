@@ -43,26 +43,11 @@ class WeakNative(Native):
 
     def values(self, inputs: npt.ArrayLike) -> Float32:
         """The generated function: gains, then integrands [vectors, results] from inputs [vectors, inputs]."""
-        return self._called(self.model.values, inputs, int(self.model.gains + self.model.integrands))
-
-    def prepared(self, jets: npt.ArrayLike) -> Float32:
-        """The generated function: derivatives of the runs, then arguments of signs [vectors, results]."""
-        return self._called(self.model.prepare, jets, int(self.model.runs + self.model.signs))
-
-    def theta(self, p: npt.ArrayLike) -> Float32:
-        """theta [vectors, n_theta] from p [vectors, n_p]."""
-        return self._called(self.model.model.theta, p, int(self.model.model.n_theta))
-
-    def jacobian(self, p: npt.ArrayLike) -> Float32:
-        """Non-zeros of d theta / d p [vectors, n_c]."""
-        return self._called(self.model.model.jacobian, p, int(self.model.model.n_c))
-
-    def _called(self, function: Any, inputs: npt.ArrayLike, results: int) -> Float32:
         given = np.ascontiguousarray(inputs, np.float32)
-        out = np.zeros((len(given), results), np.float32)
+        out = np.zeros((len(given), int(self.model.gains + self.model.integrands)), np.float32)
         pointer = self.headers.pointer
         self.library.pvid_replay_function_f32(
-            function, len(given), given.shape[1], results, pointer(given), pointer(out)
+            self.model.values, len(given), given.shape[1], out.shape[1], pointer(given), pointer(out)
         )
         return out
 
