@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from bench import recorded_rigs
-from bench.recordings import KEPT, SOURCES
+from bench.kept_recordings import KEPT
+from bench.recordings import SOURCES
 from pvid.models.drive import Sines
 from pvid.models.simulated_rig import SimulatedRig
 from pvid.rig.run import Recording, write_recording

@@ -36,6 +36,22 @@
 #error "PVID_MAX_P must lie in 3..8"
 #endif
 
+/* Largest number of constraints between parameters (model.h); 0 leaves them out. */
+#ifndef PVID_MAX_CONSTRAINTS
+#define PVID_MAX_CONSTRAINTS 0
+#endif
+#if PVID_MAX_CONSTRAINTS < 0 || PVID_MAX_CONSTRAINTS > 8
+#error "PVID_MAX_CONSTRAINTS must lie in 0..8"
+#endif
+
+/* Largest number of directions along which parameters drift (model.h); 0 leaves them out. */
+#ifndef PVID_MAX_DRIFTS
+#define PVID_MAX_DRIFTS 0
+#endif
+#if PVID_MAX_DRIFTS < 0 || PVID_MAX_DRIFTS > 4
+#error "PVID_MAX_DRIFTS must lie in 0..4"
+#endif
+
 /* Largest number of entries of M, the sum of n (n + 1) / 2 over the kinds of rows, of n theta each. RAM: 12
  * bytes each. */
 #ifndef PVID_MAX_MOMENTS

@@ -38,6 +38,8 @@ extern "C" {
     SIZE("window", PVID_MAX_WINDOW, 16777619u)                                                                         \
     SIZE("theta", PVID_MAX_THETA, 637696617u)                                                                          \
     SIZE("p", PVID_MAX_P, 1055306571u)                                                                                 \
+    SIZE("constraints", PVID_MAX_CONSTRAINTS, 2166136261u)                                                             \
+    SIZE("drifts", PVID_MAX_DRIFTS, 84696351u)                                                                         \
     SIZE("moments", PVID_MAX_MOMENTS, 1345077009u)                                                                     \
     SIZE("decimation", PVID_MAX_DECIMATION, 1185368003u)                                                               \
     SIZE("functions", PVID_MAX_FUNCTIONS, 4233492473u)                                                                 \

@@ -16,6 +16,12 @@
  * M then has a block for each kind and no entries between them. C has all theta: a parameter may occur in several
  * kinds. Every row has the same variance, so rows of different units are divided by their standard deviations.
  *
+ * Constraints. g(p) = 0 of parameters that nobody has solved for some of them (PVID_MAX_CONSTRAINTS > 0): a function
+ * writes g and its gradient of each. init moves the start to g = 0, and every step stays there: theory.md 4.
+ *
+ * Drifts. Directions in which alone parameters change in time, as with a temperature (PVID_MAX_DRIFTS > 0): what older
+ * rows tell along them is forgotten, and nothing else.
+ *
  */
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
@@ -50,6 +56,17 @@ struct pvid_model_f32 {
     void (*theta)(const float p[], float theta[]);
     /* c[n_c] = the non-zeros of d theta / d p at p, in the order of c_row */
     void (*jacobian)(const float p[], float c[]);
+#if PVID_MAX_CONSTRAINTS > 0
+    uint8_t n_constraints; /* 0..PVID_MAX_CONSTRAINTS, fewer than n_p; n_p <= n_theta + n_constraints */
+    /* g[n_constraints][1 + n_p] = each constraint at p, then d / dp of it; NULL without constraints */
+    void (*constraints)(const float p[], float g[]);
+#endif
+#if PVID_MAX_DRIFTS > 0
+    uint8_t n_drifts; /* 0..PVID_MAX_DRIFTS; without forgetting along them all parameters are constant */
+    float drift_s;    /* time constant of what the rows tell along a drift [s], at least 4 groups */
+    /* d[n_drifts][n_p] = directions dp/dt at p, of any length; NULL without drifts */
+    void (*drifts)(const float p[], float d[]);
+#endif
 };
 
 #ifdef __cplusplus

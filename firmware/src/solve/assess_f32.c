@@ -3,9 +3,11 @@
 #include "solve/assess_f32.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "number/exact.h"
 #include "number/finite_f32.h"
+#include "solve/constraints_f32.h"
 
 /* Degrees of freedom of the residuals. */
 static float freedom_of(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings)
@@ -41,9 +43,16 @@ bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve
     const size_t count = PVID_COUNT(PVID_MAX_P, n);
     const float much = (settings->noise_margin * variance) * system->weight;
     float excess[PVID_MAX_P][PVID_MAX_P];
+#if PVID_MAX_CONSTRAINTS > 0
+    float of_noise[PVID_MAX_P][PVID_MAX_P];
+    memcpy(of_noise, noise, sizeof of_noise);
+    pvid_constraints_project_f32(&system->ties, n, of_noise, NULL);
+#else
+    const float (*of_noise)[PVID_MAX_P] = noise;
+#endif
     for (size_t a = 0; a < count; a++) {
         for (size_t b = a; b < count; b++) {
-            excess[a][b] = system->s[a][b] - (much * noise[a][b]);
+            excess[a][b] = system->s[a][b] - (much * of_noise[a][b]);
         }
     }
     pvid_cholesky_f32 factor;

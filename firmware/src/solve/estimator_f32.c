@@ -11,6 +11,8 @@
 #include "number/init.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
+#include "solve/constraints_f32.h"
+#include "solve/information_f32.h"
 #include "solve/kinds.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
@@ -30,6 +32,55 @@ const pvid_estimator_config_f32 pvid_estimator_defaults_f32 = {
 
 /* ---- configuration ---- */
 
+static bool constraints_are_valid(const pvid_model_f32 *model)
+{
+#if PVID_MAX_CONSTRAINTS > 0
+    const uint32_t count = model->n_constraints;
+    return (count <= PVID_MAX_CONSTRAINTS) && (count < model->n_p) && ((count == 0u) || (model->constraints != NULL)) &&
+           (model->n_p <= (model->n_theta + count));
+#else
+    return model->n_p <= model->n_theta;
+#endif
+}
+
+/* p on the constraints. Returns whether there is such a p near it. */
+static bool return_to_constraints(const pvid_estimator_f32 *self, float p[])
+{
+#if PVID_MAX_CONSTRAINTS > 0
+    return (self->model->n_constraints == 0u) ||
+           pvid_constraints_return_f32(self->model, &self->settings, p, PVID_RETURNS_AT_INIT);
+#else
+    (void)self;
+    (void)p;
+    return true;
+#endif
+}
+
+static bool drifts_are_valid(const pvid_estimator_config_f32 *config)
+{
+#if PVID_MAX_DRIFTS > 0
+    const pvid_model_f32 *model = config->model;
+    return (model->n_drifts == 0u) || ((model->n_drifts <= PVID_MAX_DRIFTS) && (model->drifts != NULL) &&
+                                       pvid_within_f32(model->drift_s * config->update_rate_hz, 4.0f, 1.0e12f));
+#else
+    (void)config;
+    return true;
+#endif
+}
+
+/* The share that a drift leaves. */
+PVID_COLD static void prepare_drifts(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+{
+#if PVID_MAX_DRIFTS > 0
+    if (config->model->n_drifts > 0u) {
+        self->settings.drift_keep = pvid_settings_decay_f32(1.0f / (config->model->drift_s * config->update_rate_hz));
+    }
+#else
+    (void)self;
+    (void)config;
+#endif
+}
+
 static bool model_is_valid(const pvid_model_f32 *model)
 {
     if ((PVID_CHECK_TABLES == 0) && (model != NULL)) {
@@ -38,7 +89,7 @@ static bool model_is_valid(const pvid_model_f32 *model)
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
            (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && ((PVID_EXACT == 0) || (model->n_p == PVID_MAX_P)) &&
-           (model->n_p <= model->n_theta) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) &&
+           constraints_are_valid(model) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) &&
            (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
            (model->n_moments == pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end));
 }
@@ -49,10 +100,19 @@ static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
     if (!model_is_valid(model)) {
         return PVID_BAD_MODEL;
     }
+    if (!drifts_are_valid(config)) {
+        return PVID_BAD_MODEL;
+    }
     const pvid_status status = pvid_settings_are_valid_f32(config, model->n_p, model->positive, config->update_rate_hz);
     if (status != PVID_OK) {
         return status;
     }
+#if PVID_MAX_CONSTRAINTS > 0
+    /* law (5) leaves F where it is: there is no force that a constraint could take */
+    if ((model->n_constraints > 0u) && (pvid_settings_gain_f32(config, config->update_rate_hz, 1.0f) < 1.0f)) {
+        return (config->law == PVID_LAW_STATIONARY) ? PVID_BAD_FEEDBACK : PVID_BAD_LAW;
+    }
+#endif
     return pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ? PVID_OK : PVID_BAD_ROW_WEIGHT;
 }
 
@@ -74,7 +134,6 @@ PVID_COLD static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estima
         self->settings.lower[i] = config->lower[i];
         self->settings.upper[i] = config->upper[i];
     }
-    config->model->theta(self->p, self->theta);
     self->settings.row_variance = config->row_sd * config->row_sd;
     self->settings.gain = pvid_settings_gain_f32(config, config->update_rate_hz, (float)config->divider);
     self->settings.correlation = config->correlation;
@@ -85,6 +144,11 @@ PVID_COLD static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estima
     self->settings.n_p = config->model->n_p;
     self->settings.positive = (uint8_t)(config->model->positive & 0xFFu);
     self->divider = config->divider;
+    prepare_drifts(self, config);
+    if (!return_to_constraints(self, self->p)) {
+        return PVID_BAD_START;
+    }
+    config->model->theta(self->p, self->theta);
     return PVID_OK;
 }
 
@@ -103,12 +167,21 @@ void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
     if (!pvid_estimator_is_ready_f32(self)) {
         return;
     }
+#if PVID_MAX_CONSTRAINTS > 0
+    float before[PVID_MAX_P];
+    memcpy(before, self->p, sizeof before);
+#endif
     for (size_t a = 0; a < self->model->n_p; a++) {
         if (pvid_finite_f32(p[a])) {
             const float x = (p[a] < self->settings.lower[a]) ? self->settings.lower[a] : p[a];
             self->p[a] = (x > self->settings.upper[a]) ? self->settings.upper[a] : x;
         }
     }
+#if PVID_MAX_CONSTRAINTS > 0
+    if (!return_to_constraints(self, self->p)) {
+        memcpy(self->p, before, sizeof before);
+    }
+#endif
     self->model->theta(self->p, self->theta);
 }
 

@@ -12,6 +12,8 @@
 #include "number/finite_f32.h"
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
+#include "solve/constraints_f32.h"
+#include "solve/drift_f32.h"
 #include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
@@ -43,6 +45,9 @@ enum {
 /* Columns of M that a stage adds. */
 #define ROWS_PER_STAGE 3u
 #define COLUMNS_PER_STAGE 2u
+
+/* Of a step that leads too far from the constraints. */
+#define HALVINGS 4u
 
 /* ---- rows ---- */
 
@@ -146,10 +151,34 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
     return solve->index < model->n_p;
 }
 
+/* S and F of the independent parameters; the others have S as with four times their prior information. */
+static void constrain(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+#if PVID_MAX_CONSTRAINTS > 0
+    pvid_system_f32 *system = &solve->system;
+    const size_t n_p = self->model->n_p;
+    system->ties.count = 0;
+    if (self->model->n_constraints == 0u) {
+        return;
+    }
+    pvid_constraints_at_f32(&system->ties, self->model, &self->settings, self->p);
+    pvid_constraints_shift_f32(&system->ties, n_p, (const float (*)[PVID_MAX_P])system->s, system->force);
+    pvid_constraints_project_f32(&system->ties, n_p, system->s, system->force);
+    for (size_t k = 0; k < system->ties.count; k++) {
+        const size_t place = system->ties.place[k];
+        system->s[place][place] = 3.0f * self->settings.prior[place];
+    }
+#else
+    (void)self;
+    (void)solve;
+#endif
+}
+
 static void force_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     pvid_pattern_project_row_f32(self->model, solve->work.c, 0, &solve->sums[self->model->n_moments],
                                  solve->system.force);
+    constrain(self, solve);
 }
 
 /* The noise has row_sd^2 in a solve, because the residuals are larger while p is far from the solution, and the
@@ -199,6 +228,35 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
     solve->size = solution.size;
 }
 
+/* The step ends on the constraints: shortened to half until Newton's steps lead there. */
+static void return_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+#if PVID_MAX_CONSTRAINTS > 0
+    float whole[PVID_MAX_P];
+    float part = 1.0f;
+    if ((self->model->n_constraints == 0u) || (solve->reason != PVID_UPDATED) || solve->in_dead_zone) {
+        return;
+    }
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        whole[a] = solve->p[a] - self->p[a];
+    }
+    for (size_t left = HALVINGS; left > 0u; left--) {
+        if (pvid_constraints_return_f32(self->model, &self->settings, solve->p, PVID_RETURNS_OF_STEP)) {
+            return;
+        }
+        part *= 0.5f;
+        for (size_t a = 0; a < self->model->n_p; a++) {
+            solve->p[a] = self->p[a] + (part * whole[a]);
+        }
+    }
+    solve->reason = pvid_count_held(&self->counters, PVID_HELD_SINGULAR);
+    memcpy(solve->p, self->p, sizeof solve->p);
+#else
+    (void)self;
+    (void)solve;
+#endif
+}
+
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
 #if !PVID_FEEDBACK
@@ -214,6 +272,7 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
     memcpy(solve->p, self->p, sizeof solve->p);
     if (solve->reason == PVID_UPDATED) {
         take_step(self, solve, rhs);
+        return_step(self, solve);
     }
     if ((solve->reason != PVID_UPDATED) && (solve->fallback != NULL)) {
         memcpy(solve->p, solve->fallback, sizeof solve->p);
@@ -385,7 +444,8 @@ static bool advance_shared(const pvid_estimator_f32 *self, pvid_estimator_solve_
     case STAGE_PROJECT:
         return project_stage(self, solve);
     case STAGE_FORCE:
-        return false; /* an assessment needs none */
+        constrain(self, solve); /* an assessment needs no F */
+        return false;
     default:
         above_noise_stage(self, solve);
         return false;
@@ -433,6 +493,9 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
         commit_stage(self, solve);
         break;
     case STAGE_FOLD:
+#if PVID_MAX_DRIFTS > 0
+        pvid_drift_forget_f32(self);
+#endif
         pvid_information_end_group_f32(&self->information);
         break;
     default:
@@ -468,6 +531,11 @@ PVID_COLD bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self,
         repeat = solve->index < self->model->n_p;
         break;
     case STAGE_SCALE:
+#if PVID_MAX_CONSTRAINTS > 0
+        if (solve->solvable) {
+            pvid_constraints_spread_f32(&solve->system.ties, self->settings.n_p, solve->estimate->covariance);
+        }
+#endif
         pvid_assess_scale_f32(&self->settings, wide, solve->solvable, solve->estimate);
         break;
     default:

@@ -15,6 +15,7 @@
 #include "number/finite_f32.h"
 #include "solve/assess_f32.h"
 #include "solve/cholesky_f32.h"
+#include "solve/constraints_f32.h"
 #include "pvid/estimator.h"
 
 /* A step. The caller sets p, which may be the p of the equations; it is written only if a step is taken. */
@@ -112,6 +113,24 @@ static inline void pvid_step_hold_f32(size_t n, uint8_t pinned, float dp[])
     }
 }
 
+#if PVID_MAX_CONSTRAINTS > 0
+/* Factor that ends a part of a step where the first of the tied parameters would leave its bounds: clamped alone, it
+ * would leave its constraint. The last of it is rounding, and left to the bounds. */
+static inline float pvid_step_room_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                                       const float p[], const float dp[], float part)
+{
+    float room = 1.0f;
+    for (size_t a = 0; (system->ties.count > 0u) && (a < settings->n_p); a++) {
+        const float step = part * dp[a];
+        const float way = (step < 0.0f) ? (settings->lower[a] - p[a]) : (settings->upper[a] - p[a]);
+        const bool leaves = (step < 0.0f) ? (step < way) : (step > way);
+        const float own = leaves ? ((way / step) * (1.0f + 2.4e-7f)) : 1.0f;
+        room = (own < room) ? own : room;
+    }
+    return room;
+}
+#endif
+
 /* Factor that shortens a step of this relative size to the step limit; sets *limited. */
 static inline float pvid_step_shortening_f32(const pvid_solve_settings_f32 *settings, float size, bool *limited)
 {
@@ -180,6 +199,9 @@ static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_
     }
     pvid_cholesky_solve_f32(factor, rhs, dp);
     pvid_step_hold_f32(settings->n_p, pinned, dp);
+#if PVID_MAX_CONSTRAINTS > 0
+    pvid_constraints_complete_f32(&system->ties, settings->n_p, dp);
+#endif
     const float size = pvid_step_size_f32(settings, p, dp);
     if (!pvid_finite_f32(size)) {
         solution->reason = PVID_HELD_SINGULAR;
@@ -194,7 +216,10 @@ static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_
         solution->bounded = true;
         return;
     }
-    const float part = pvid_step_shortening_f32(settings, size, &solution->limited);
+    float part = pvid_step_shortening_f32(settings, size, &solution->limited);
+#if PVID_MAX_CONSTRAINTS > 0
+    part *= pvid_step_room_f32(system, settings, p, dp, part);
+#endif
     for (size_t a = 0; a < n_p; a++) {
         solution->p[a] = pvid_step_bounded_f32(settings, p, a, part * dp[a], &solution->bounded);
     }

@@ -16,11 +16,26 @@ typedef struct {
     float step_limit;
     float kappa_min;
     float noise_margin;
-    float dead_zone;  /* square of the configured one */
+    float dead_zone; /* square of the configured one */
+#if PVID_MAX_DRIFTS > 0
+    float drift_keep; /* share of the information along a drift that a group leaves */
+#endif
     uint8_t n_p;      /* parameters */
     uint8_t positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a]; PVID_MAX_P <= 8 */
     uint8_t blocked;  /* bit a set: p[a] was at its bound, and the last solve would have moved it outwards */
 } pvid_solve_settings_f32;
+
+#if PVID_MAX_CONSTRAINTS > 0
+/* Constraints at a p, each solved for a parameter: dp[place] = rest - slope dp. */
+typedef struct {
+    uint8_t count;                       /* of those that are independent of each other */
+    uint8_t dependent;                   /* bit a: p[a] is the place of one */
+    uint8_t place[PVID_MAX_CONSTRAINTS]; /* that parameter */
+    float rest[PVID_MAX_CONSTRAINTS];
+    float slope[PVID_MAX_CONSTRAINTS][PVID_MAX_P]; /* 0 of dependent parameters */
+    float off;                                     /* sum of |g|, in large steps */
+} pvid_constraints_f32;
+#endif
 
 /* The normal equations of a solve and the residuals at p, gathered from the sums (estimator.h):
  *
@@ -32,6 +47,9 @@ typedef struct {
     float rounding;                  /* bound of its rounding error [units of Y^2] */
     float floor;                     /* lower limit of rss + rounding [units of Y^2] */
     float weight;                    /* rows in the sums */
+#if PVID_MAX_CONSTRAINTS > 0
+    pvid_constraints_f32 ties; /* S and F are those of the independent parameters */
+#endif
 } pvid_system_f32;
 
 /* Only the functions of estimator.h write to it. */

@@ -50,6 +50,11 @@ class Estimator:
         Whether each p is positive; that of the start by default.
     rate, forgetting
         Rows a second [Hz], and time constant of forgetting [s]; 0: none.
+    drift, drift_s
+        p [n_p] -> directions [n_p] or [k, n_p] in which alone p changes in time, and the time constant of what rows
+        tell along them [s]. None: there are none.
+    constraints
+        p [n_p] -> g [m], which is 0 at every estimate; the start is moved there. None: there are none.
 
     Raises
     ------
@@ -75,9 +80,12 @@ class Estimator:
         positive: Sequence[bool] | None = None,
         rate: float = 1.0,
         forgetting: float = 0.0,
+        drift: Callable[[Float], npt.ArrayLike] | None = None,
+        drift_s: float = 0.0,
+        constraints: Callable[[Float], npt.ArrayLike] | None = None,
     ) -> None:
         self._native = Native()
-        self._theta, self._jacobian = theta, jacobian
+        self._theta, self._jacobian, self._tied, self._drift = theta, jacobian, constraints, drift
         first, spread = (np.atleast_1d(np.asarray(one, np.float64)) for one in (start, start_sd))
         n_p, n_theta = first.size, np.atleast_1d(np.asarray(theta(first), np.float64)).size
         signs = np.asarray(first > 0 if positive is None else positive, bool)
@@ -96,7 +104,11 @@ class Estimator:
         model.n_theta, model.n_p, model.n_moments = n_theta, n_p, n_theta * (n_theta + 1) // 2
         model.n_c, model.c_row, model.c_column = len(places), self._rows, self._columns
         model.positive = sum(1 << k for k in range(n_p) if signs[k])
-        model.theta, model.jacobian = self._callbacks
+        model.theta, model.jacobian, model.constraints, model.drifts = self._callbacks
+        if drift is not None:
+            model.n_drifts, model.drift_s = np.size(drift(first)) // n_p, drift_s
+        if constraints is not None:
+            model.n_constraints = np.size(constraints(first))
         config = ffi.new("pvid_estimator_config_f32 *", library.pvid_estimator_defaults_f32)
         config.model = model
         for name, values in (("start", first), ("start_sd", spread), ("lower", least), ("upper", most)):
@@ -106,8 +118,14 @@ class Estimator:
                 getattr(config, name)[k] = value
         config.row_sd, config.update_rate_hz, config.forgetting_s = row_sd, rate, forgetting
         status = Status(library.pvid_estimator_init_layout_f32(self._state, config, library.pvid_layout()))
+        if drift is not None and not 4.0 <= drift_s * rate <= 1e12:
+            raise PvidError(f"drift_s is {drift_s} s, it must be at least four rows: {4 / rate:g} s")
         if status is Status.BAD_MODEL:
             raise self._too_large()
+        if status is Status.BAD_START and constraints is not None:
+            raise PvidError(
+                "no p near the start, within its bounds, meets the constraints: do these contradict each other?"
+            )
         if status is not Status.OK:
             raise PvidError(f"the core refused the estimator: {status.text}")
 
@@ -123,7 +141,7 @@ class Estimator:
             "build it with larger PVID_MAX_P, PVID_MAX_THETA and PVID_MAX_MOMENTS"
         )
 
-    def _functions(self) -> tuple[Any, Any]:
+    def _functions(self) -> tuple[Any, ...]:
         ffi = self._native.headers.ffi
 
         def theta(p: Any, out: Any) -> None:
@@ -135,9 +153,22 @@ class Estimator:
             for k, value in enumerate(slope.T.ravel()):
                 out[k] = value
 
-        return ffi.callback("void(*)(const float *, float *)", theta), ffi.callback(
-            "void(*)(const float *, float *)", jacobian
-        )
+        def constraints(p: Any, out: Any) -> None:
+            assert self._tied is not None
+            at = self._numbers(p)
+            g = np.ravel(np.asarray(self._tied(at), np.float64))
+            for k, value in enumerate(np.column_stack([g, self._differences(self._tied, at, g.size)]).ravel()):
+                out[k] = value
+
+        def drift(p: Any, out: Any) -> None:
+            assert self._drift is not None
+            for k, value in enumerate(np.ravel(np.asarray(self._drift(self._numbers(p)), np.float64))):
+                out[k] = value
+
+        kind = "void(*)(const float *, float *)"
+        tied = ffi.NULL if self._tied is None else ffi.callback(kind, constraints)
+        moving = ffi.NULL if self._drift is None else ffi.callback(kind, drift)
+        return ffi.callback(kind, theta), ffi.callback(kind, jacobian), tied, moving
 
     def _numbers(self, p: Any) -> Float:
         return np.array([p[k] for k in range(self.n_p)], np.float64)
@@ -145,9 +176,12 @@ class Estimator:
     def _slope(self, p: Float) -> Float:
         if self._jacobian is not None:
             return np.asarray(self._jacobian(p), np.float64).reshape(self.n_theta, self.n_p)
+        return self._differences(self._theta, p, self.n_theta)
+
+    def _differences(self, function: Callable[[Float], npt.ArrayLike], p: Float, size: int) -> Float:
         steps = _STEP * np.maximum(np.abs(p), 1e-3)
-        ahead, behind = (np.array([self._theta(p + s * d) for d in np.diag(steps)], np.float64) for s in (1, -1))
-        return ((ahead - behind) / (2 * steps[:, None])).reshape(self.n_p, self.n_theta).T
+        ahead, behind = (np.array([np.ravel(function(p + s * d)) for d in np.diag(steps)], np.float64) for s in (1, -1))
+        return ((ahead - behind) / (2 * steps[:, None])).reshape(len(p), size).T
 
     def step(self, n: npt.ArrayLike, y: float) -> str:
         """One row N [n_theta] and Y: adds it and moves p. Returns the reason in words."""

@@ -52,8 +52,10 @@ def check(model: str) -> int:
     from pvid.model.report import check_report, identifiable
     from pvid.models.mechanisms import compiled_of
     from pvid.models.registry import asked_for
+    from pvid.oracle.weak.parameters import Parameters
 
     compiled = compiled_of(asked_for(model))
+    Parameters(compiled).checked(None)  # raises where the constraints contradict each other
     if (refusal := too_many_unknowns(compiled.name, len(compiled.unknowns))) is not None:
         write_stderr(f"pvid: note: {refusal}")
     click.echo(check_report(compiled))

@@ -17,6 +17,7 @@ SIZES = {
     "channels": ("INPUTS", "CHANNELS"),
     "theta": ("P", "THETA"),
     "jacobian": ("P", "C"),
+    "constraints": ("P", "CONSTRAINED"),
 }
 
 
@@ -25,6 +26,7 @@ MEANING = {
     "channels": "From the inputs of one instant: the channels.",
     "theta": "From p: theta.",
     "jacobian": "From p: the non-zeros of d theta / d p by columns, in the order of c_row and c_column.",
+    "constraints": "From p: each constraint, which is 0, and its derivatives by p.",
 }
 
 
@@ -51,6 +53,8 @@ def _sizes(functions: ModelFunctions, command: str) -> str:
     }
     if functions.integrands.labels:
         counts["INTEGRANDS"] = len(functions.integrands.labels)
+    if functions.constraints.labels:
+        counts["CONSTRAINED"] = len(functions.constraints.labels)
     about = [
         f"{name}_sizes.h - how many parameters, coefficients and channels {name} has.",
         "",
@@ -106,7 +110,7 @@ def _source(functions: ModelFunctions, command: str) -> str:
         UNCONTRACTED,
         includes_of(f"{name}.h", functions.functions),
         *(float_function(_signature(functions, one), one.program) for one in functions.functions),
-        model_struct(functions, f"{name}_theta_f32", f"{name}_jacobian_f32"),
+        model_struct(functions, f"{name}_theta_f32", f"{name}_jacobian_f32", f"{name}_constraints_f32"),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -123,8 +127,9 @@ def includes_of(header: str, functions: Sequence[Function], standard: Sequence[s
     return "\n\n".join("\n".join(group) for group in groups)
 
 
-def model_struct(functions: ModelFunctions, theta: str, jacobian: str) -> str:
+def model_struct(functions: ModelFunctions, theta: str, jacobian: str, constraints: str) -> str:
     """The pattern and NAME_model_f32, with these functions."""
+    tied = len(functions.model.constraints)
     name, upper = functions.name, functions.name.upper()
     positive = sum(1 << k for k, one in enumerate(functions.model.unknowns) if one.positive)
     several = len(functions.kinds) > 1
@@ -147,6 +152,7 @@ def model_struct(functions: ModelFunctions, theta: str, jacobian: str) -> str:
             "    .c_column = c_column,",
             f"    .theta = {theta},",
             f"    .jacobian = {jacobian},",
+            *([f"    .n_constraints = {tied},", f"    .constraints = {constraints},"] if tied else []),
             "};",
         ]
     )

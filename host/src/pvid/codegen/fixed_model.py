@@ -110,6 +110,7 @@ def fixed_model(functions: ModelFunctions, given: Reaches | None = None) -> Fixe
     PvidError
         Where fixed point cannot compute a function: a divisor that may be 0, a square root, a value too large.
     """
+    functions.model.refuse_constraints("fixed point")
     reaches = reaches_of(functions, given or Reaches())
     bounds = [symmetric(one) for one in reaches]
     bits = [bits_of(one) for one in bounds]

@@ -111,6 +111,7 @@ class ModelFunctions:
     name : of the files, prefix of all names in C
     inputs : of channels and integrands
     channels, integrands, theta, jacobian : the functions
+    constraints : each and its slopes by p; without labels where the model has none
     c_row, c_column : of each non-zero of C, by columns
     terms : of all columns, by kind and column
     kinds : of rows
@@ -123,6 +124,7 @@ class ModelFunctions:
     channels: Function
     theta: Function
     jacobian: Function
+    constraints: Function
     c_row: tuple[int, ...]
     c_column: tuple[int, ...]
     terms: tuple[Term, ...]
@@ -131,7 +133,8 @@ class ModelFunctions:
     @property
     def functions(self) -> tuple[Function, ...]:
         """Those that have results."""
-        return tuple(one for one in (self.integrands, self.channels, self.theta, self.jacobian) if one.labels)
+        of_p = (self.theta, self.jacobian, self.constraints)
+        return tuple(one for one in (self.integrands, self.channels, *of_p) if one.labels)
 
     @cached_property
     def p_names(self) -> list[str]:
@@ -191,6 +194,8 @@ def functions_of(
     theta = tuple(with_values(model, one) for row in model.rows for one in row.theta)
     p_names = identifiers(model.p_names)
     c_row, c_column, c = _jacobian(model, theta)
+    tied = [with_values(model, one) for one in model.constraints]
+    g = tuple(value for one in tied for value in (one, *(sp.diff(one, symbol) for symbol in model.p)))
 
     def function(
         name: str, of: Sequence[sp.Expr], by: Sequence[str], e: tuple[sp.Expr, ...], labels: Sequence[str]
@@ -211,6 +216,7 @@ def functions_of(
             c,
             [f"d theta[{i}] / d {model.p_names[j]}" for i, j in zip(c_row, c_column, strict=True)],
         ),
+        constraints=function("constraints", model.p, p_names, g, [str(one) for one in g]),
         c_row=c_row,
         c_column=c_column,
         terms=terms,
@@ -301,6 +307,10 @@ def _jacobian(
         (i, j, value) for j, p in enumerate(model.p) for i, one in enumerate(theta) if (value := sp.diff(one, p)) != 0
     ]
     missing = set(range(len(model.p))) - {j for _, j, _ in entries}
+    tied = {one for value in model.constraints for one in value.free_symbols}
+    entries += [(0, j, sp.Integer(0)) for j in missing if model.p[j] in tied]  # every parameter has a column
+    entries.sort(key=lambda one: (one[1], one[0]))
+    missing -= {j for j in missing if model.p[j] in tied}
     if missing:
         raise PvidError(f"{model.name}: {model.p_names[min(missing)]} is in no coefficient of a row: remove it")
     rows, columns, values = zip(*entries, strict=True)

@@ -275,6 +275,7 @@ def refine_functions(model: CompiledModel, widths: Mapping[str, float] | None = 
 
     Parameters as of `refine_functions_of`; widths that are not given are refined.
     """
+    model.refuse_constraints("the second stage")
     return _refined((model, tuple(sorted((widths or {}).items()))))
 
 

@@ -82,7 +82,8 @@ class WeakFunctions:
     @property
     def with_results(self) -> tuple[Function, ...]:
         """The functions that have results."""
-        own = (self.prepare, self.values, self.functions.theta, self.functions.jacobian)
+        of_p = (self.functions.theta, self.functions.jacobian, self.functions.constraints)
+        own = (self.prepare, self.values, *of_p)
         return tuple(one for one in own if one.labels)
 
     @property
@@ -147,6 +148,7 @@ def theta_model(functions: ModelFunctions) -> ThetaModel:
         c_row=functions.c_row,
         c_column=functions.c_column,
         kind_end=functions.kind_end,
+        constraints=len(functions.model.constraints),
     )
 
 

@@ -75,6 +75,7 @@ def fixed_weak(made: WeakFunctions, given: JetReaches | None = None) -> FixedWea
     PvidError
         Where fixed point cannot compute a function, with the quantity.
     """
+    made.model.refuse_constraints("fixed point")
     chosen = given or JetReaches()
     name = made.name
     reaches = _reaches(made, chosen)

@@ -14,6 +14,7 @@ _MEANING = {
     "PVID_MAX_THETA": "coefficients",
     "PVID_MAX_P": "unknowns",
     "PVID_MAX_MOMENTS": "products of coefficients",
+    "PVID_MAX_CONSTRAINTS": "constraints",
     "PVID_MAX_THETA_Q31": "coefficients",
     "PVID_MAX_MOMENTS_Q31": "products of coefficients",
     "PVID_MAX_C_Q31": "derivatives of coefficients by unknowns",
@@ -87,12 +88,15 @@ def sizes_of_model(model: WeakModel) -> dict[str, int]:
         "PVID_MAX_KINDS": model.kinds,
         "PVID_MAX_COLUMNS": max(one.columns for one in model.kind),
     }
+    if model.model.constraints:
+        sizes["PVID_MAX_CONSTRAINTS"] = model.model.constraints
     return _checked(model.name, sizes)
 
 
 def sizes_of_design(design: WeakDesign32) -> dict[str, int]:
     """Those of its model among them; raises as for that, and where the rows cannot determine all unknowns."""
-    refuse_too_few_functions(design.model.name, design.model.model.n_theta, design.model.model.n_p)
+    of_theta = design.model.model
+    refuse_too_few_functions(design.model.name, of_theta.n_theta + of_theta.constraints, of_theta.n_p)
     sizes = sizes_of_model(design.model) | {
         "PVID_MAX_RING": design.model.signals * (4 * design.half_steps + 5),
         "PVID_MAX_HARMONICS": design.highest + 1,

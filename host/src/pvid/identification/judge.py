@@ -322,6 +322,8 @@ class _Trial:
     def refined(self, best: Candidate) -> Candidate | None:
         """The refinement from an estimate on: it is weighted by what that reaches, not by the sensors' noise."""
         motion, samples = self._motion, self._block
+        if self._answer.model.constraints:  # which it does not keep
+            return None
         if self._is_spent or not any(one.r2 > 0 for one in best.sensors):  # no motion near the recorded one
             return None
         sd = np.maximum(motion.sd, [one.rms for one in best.sensors])

@@ -10,6 +10,7 @@ from typing import Literal
 
 import sympy as sp
 
+from pvid.base.errors import PvidError
 from pvid.model.signals import Jet
 from pvid.settings.forms import FORMS
 
@@ -245,11 +246,13 @@ class Together:
     ----------
     unknowns, outputs : of one recording
     own : of each recording, symbol of an unknown in the rows and equations -> its symbol in p
+    constraints : of one recording
     """
 
     unknowns: tuple[Unknown, ...]
     outputs: tuple[Output, ...]
     own: tuple[Mapping[sp.Symbol, sp.Symbol], ...]
+    constraints: tuple[sp.Expr, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -277,6 +280,7 @@ class CompiledModel:
     clock_sd : relative standard deviation of the sample rate; part of the standard errors, as no run shows it
     together : of several recordings with own parameters (pvid.model.together): p has one for each recording, which the
         rows and equations contain as one symbol; None: p is what they contain
+    constraints : expressions = 0 in p and known constants
     """
 
     name: str
@@ -293,13 +297,15 @@ class CompiledModel:
     following: Following = Following()
     clock_sd: float = 5e-5  # of a quartz, its temperature and ageing included
     together: Together | None = None
+    constraints: tuple[sp.Expr, ...] = ()
 
     @cached_property
     def alone(self) -> CompiledModel:
         """Of one recording."""
         if self.together is None:
             return self
-        return replace(self, unknowns=self.together.unknowns, outputs=self.together.outputs, together=None)
+        own = self.together
+        return replace(self, unknowns=own.unknowns, outputs=own.outputs, constraints=own.constraints, together=None)
 
     @cached_property
     def places(self) -> tuple[tuple[int, ...], ...]:
@@ -310,6 +316,14 @@ class CompiledModel:
         return tuple(
             tuple(self.p.index(own.get(one.symbol, one.symbol)) for one in self.alone.unknowns) for own in of_recordings
         )
+
+    def refuse_constraints(self, what: str) -> None:
+        """PvidError where there are any, by what keeps none."""
+        if self.constraints:
+            raise PvidError(
+                f"{self.name} has constraints between its unknowns, which {what} does not keep: the weak form in "
+                "float64 and float32 does"
+            )
 
     @property
     def p(self) -> tuple[sp.Symbol, ...]:

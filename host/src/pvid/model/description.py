@@ -46,6 +46,7 @@ class Model:
         self.hidden: list[Jet] = []
         self.defined: dict[Jet, sp.Expr] = {}
         self.equations: list[Equation] = []
+        self.constraints: list[sp.Expr] = []
         self._dimensions: dict[str, Dimension] = {}
         self._coordinates: list[Jet] = []
         self._extras: list[Extra] = []
@@ -250,6 +251,23 @@ class Model:
         self._agree(whole, title)
         self.equations.append(Equation(title, whole, place_of_caller()))
 
+    def constraint(self, expression: sp.Expr) -> None:
+        """expression = 0 between unknowns and known constants, which every estimate meets; a SymPy Eq is one as well.
+
+        Nobody has to solve it for an unknown. An inequality has its margin as a further unknown: with
+        `margin = model.unknown("margin", "m", 0.1, positive=False, low=0)` the constraint l1 - l2 - margin is l2 <= l1.
+        """
+        equal = isinstance(expression, sp.Equality)
+        whole = sp.sympify(expression.lhs - expression.rhs if equal else expression)
+        title = f"constraint {len(self.constraints) + 1}"
+        self._declared(whole)
+        if jets(whole):
+            raise self._refused(f"{title} contains a signal; it is between unknowns, an equation is between signals")
+        if whole.free_symbols.isdisjoint(one.symbol for one in self.unknowns):
+            raise self._refused(f"{title} contains no unknown")
+        self._agree(whole, title)
+        self.constraints.append(whole)
+
     def add(self, text: str, guess: float = 0.0, sd: float = 1.0) -> None:
         """Adds a term with one new unknown, or changes a signal by it.
 
@@ -424,6 +442,7 @@ class Model:
         hidden = [jet.of for jet in self.hidden]
         rows = rows_of(self.equations, hidden, self.unknowns, rates, by_parts)
         used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
+        used |= {symbol for one in self.constraints for symbol in one.free_symbols}
         for one in self.unknowns:
             if one.symbol not in used:
                 raise ModelError(
@@ -444,6 +463,7 @@ class Model:
             tuple(simulated),
             (*self.hidden, *integrals),
             replace(self._refinement, extras=tuple(self._extras), shapes=dict(self._shapes)),
+            constraints=tuple(self.constraints),
         )
 
     # ---- checks

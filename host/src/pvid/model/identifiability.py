@@ -69,7 +69,7 @@ class Identifiability:
 
 def identifiable(compiled: CompiledModel) -> Identifiability:
     """Of a compiled model, for any drive; local, so that finite symmetries are listed apart."""
-    theta = list(dict.fromkeys(theta for row in compiled.rows for theta in row.theta))
+    theta = list(dict.fromkeys([theta for row in compiled.rows for theta in row.theta] + [*compiled.constraints]))
     p = list(compiled.p)
     along: list[Solutions] = []
     found = 0

@@ -20,8 +20,20 @@ __all__ = ["Identifiability", "check_report", "identifiable", "verdict"]
 def check_report(compiled: CompiledModel) -> str:
     """The whole text, in lines of at most about 120 characters where terms allow it."""
     found = identifiable(compiled)
-    blocks = [_head(compiled), *(_row(row) for row in compiled.rows), verdict(found), *_advice(compiled)]
+    blocks = [
+        _head(compiled), *(_row(row) for row in compiled.rows), verdict(found), _tied(compiled), *_advice(compiled)
+    ]  # fmt: skip
     return "\n\n".join(block for block in blocks if block)
+
+
+def _tied(compiled: CompiledModel) -> str:
+    """Which unknowns the constraints tie."""
+    if not compiled.constraints:
+        return ""
+    own = {one for value in compiled.constraints for one in value.free_symbols}
+    names = listed([one.name for one in compiled.unknowns if one.symbol in own])
+    count = len(compiled.constraints)
+    return f"{count} constraint{'s tie' if count > 1 else ' ties'} {names}."
 
 
 def verdict(found: Identifiability) -> str:
@@ -76,6 +88,7 @@ def _head(compiled: CompiledModel) -> str:
     if hidden:
         lines.append("eliminated " + ", ".join(hidden))
     lines.append("unknown    " + ", ".join(f"{one.name} [{one.unit or 1}]" for one in compiled.unknowns))
+    lines += [f"constraint {readable(one)} = 0" for one in compiled.constraints]
     if compiled.knowns:
         values = (f"{one.name} = {one.value:g} {one.unit}".strip() for one in compiled.knowns)
         lines.append("known      " + ", ".join(values))

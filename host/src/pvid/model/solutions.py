@@ -46,7 +46,8 @@ class Solutions:
             self._add(row)
 
     def columns(self, seed: int) -> sp.Matrix:
-        """d residual / d p and nuisances at random points of solutions [points * rows, n_p + nuisances]."""
+        """d residual / d p and nuisances at random points of solutions, then those of the constraints
+        [points * rows + constraints, n_p + nuisances]."""
         p, rows = self.compiled.p, self.compiled.rows
         owners = [k for k, row in enumerate(rows) for _ in row.nuisances]
         try:
@@ -64,6 +65,8 @@ class Solutions:
         for _ in range(width + 2):
             values = [sp.Rational(one.numerator, one.denominator) for one in sampler.at_random(source)]
             out += [values[k : k + width] for k in range(0, len(values), width)]
+        slopes = [[self.point.of(sp.diff(one, symbol)) for symbol in p] for one in self.compiled.constraints]
+        out += [[*one, *[sp.Integer(0)] * len(free)] for one in slopes]
         return sp.Matrix(out)
 
     def rank(self, seed: int) -> int:

@@ -74,8 +74,15 @@ def with_own(model: CompiledModel, own: Iterable[str], recordings: Sequence[str]
                 Output(f"{out.name}[{name}]", out.unit, out.value.xreplace(value))
                 for name, value in zip(recordings, values, strict=True)
             ]
-    together = Together(model.unknowns, model.outputs, tuple(values))
-    return replace(model, unknowns=tuple(unknowns), outputs=tuple(outputs), together=together)
+    constraints = dict.fromkeys(one.xreplace(value) for one in model.constraints for value in values)
+    together = Together(model.unknowns, model.outputs, tuple(values), model.constraints)
+    return replace(
+        model,
+        unknowns=tuple(unknowns),
+        outputs=tuple(outputs),
+        together=together,
+        constraints=tuple(constraints),
+    )
 
 
 def in_columns(model: CompiledModel) -> tuple[CompiledModel, tuple[str, ...]]:

@@ -69,6 +69,7 @@ def refine(answer: Analysis) -> RefinedMechanism:
         When the equations have no refinement, the recording is too short for it, or no start leads anywhere.
     """
     model, weak, recording = answer.model, answer.found, answer.recording
+    model.refuse_constraints("the refinement")
     sure = all(one.status != "not_identified" for one in weak.judged)
     small = {k for k, one in enumerate(weak.judged) if one.status == "near_zero"}
     first = None

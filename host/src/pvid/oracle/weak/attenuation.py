@@ -55,7 +55,7 @@ def other_line(fit: Fit) -> Float | None:
             f -= slope.T @ one.products @ a
         if not (np.isfinite(s).all() and np.isfinite(f).all()):
             return None
-        step = solved(s, f)
+        step = solved(s, f, fit.parameters.tangent(p))
         size = float(np.max(np.abs(step) / reach))
         p = fit.parameters.moved(p, step * min(1.0, _STEP_LIMIT / max(size, 1e-300)))
         if size < _SETTLED:

@@ -46,9 +46,9 @@ def uncertainty(fit: Fit) -> Uncertainty:
     designs, residuals = fit.designs(), fit.residuals()
     unit = fit.parameters.unit(fit.p)
     information, neighbours = moments_of(fit, designs)
-    s_inverse = inverse(information)
-    covariance = covariance_of(information, neighbours)
-    free = sum(one.free for one in fit.white) - len(fit.p)
+    s_inverse = inverse(information, fit.tangent)
+    covariance = covariance_of(information, neighbours, fit.tangent)
+    free = sum(one.free for one in fit.white) - fit.parameters.free(fit.p)
     weighted = sum(float(np.sum(e**2)) for e in residuals) / max(free, 1)
     predicted = unit * np.sqrt(np.diag(covariance) * max(1.0, weighted))
     scores = sum((np.einsum("wkp,wk->wp", d, e) for d, e in zip(designs, residuals, strict=True)))
@@ -64,13 +64,20 @@ def uncertainty(fit: Fit) -> Uncertainty:
     )
 
 
-def covariance_of(information: Float, neighbours: Float) -> Float:
+def covariance_of(information: Float, neighbours: Float, tangent: Float | None = None) -> Float:
     """Covariance of p from that of the scores of windows and their next ones [n_p, n_p].
 
     Where the run says nothing of a combination of parameters, as when the input is a law of the output, the information
     is singular, and the products would leave rounding of either sign in place of a variance. There it is that of
     independent windows: the inverse of the information, as large as its ridge allows.
+
+    Parameters
+    ----------
+    tangent : of constraints; None: there are none
     """
+    if tangent is not None:
+        own = covariance_of(tangent.T @ information @ tangent, tangent.T @ neighbours @ tangent)
+        return np.asarray(tangent @ own @ tangent.T)
     s_inverse = inverse(information)
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     if np.linalg.eigvalsh(information * np.outer(scale, scale))[0] <= RIDGE:
@@ -108,8 +115,8 @@ def inflation(fit: Fit) -> float:
     information, neighbours = moments_of(fit, fit.designs())
     windows = fit.rows.windows
     shared = neighbours * windows / max(windows - 1, 1)  # every window has a next one
-    s_inverse = inverse(information)
-    factors = np.diag(s_inverse @ (shared + shared.T) @ s_inverse) / np.diag(s_inverse)
+    s_inverse = inverse(information, fit.tangent)
+    factors = np.diag(s_inverse @ (shared + shared.T) @ s_inverse) / np.maximum(np.diag(s_inverse), 1e-300)
     return 1.0 + max(0.0, float(np.max(factors)))
 
 
@@ -141,7 +148,7 @@ def clustered_variance(scores: Float, s_inverse: Float) -> Float:
 def chi2_of_sensors(fit: Fit) -> float:
     """Mean square of the residuals in the metric of the sensors' noise alone."""
     theta = fit.parameters.theta(fit.p)
-    total, free = 0.0, -len(fit.p)
+    total, free = 0.0, -fit.parameters.free(fit.p)
     for white in fit.white:
         exact = not any(fit.errors[kind].variance for kind in white.kinds)
         plain = white if exact else fit.rows.white(white.kinds, theta, [EquationError()] * fit.rows.kinds)

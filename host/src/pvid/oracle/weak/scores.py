@@ -58,7 +58,8 @@ class Scores:
         self.residuals = np.concatenate(fit.residuals(), axis=1)
         self.prior = np.diag(fit.parameters.prior(fit.start))
         self.unit = fit.parameters.unit(fit.p)
-        self.inverse = inverse(np.einsum("wkp,wkq->pq", self.slopes, self.slopes) + self.prior)
+        self.tangent = fit.tangent
+        self.inverse = inverse(np.einsum("wkp,wkq->pq", self.slopes, self.slopes) + self.prior, self.tangent)
 
     def shift(self, one: Candidate) -> Float:
         """What p moves by when a term of size 1 is added [n_p]."""
@@ -111,7 +112,9 @@ class Scores:
             [_products(self.slopes[own], self.residuals[own][..., np.newaxis])[:, 0] for own in self._folds()]
         )
         whole, b = jj.sum(axis=0) + self.prior, jr.sum(axis=0)
-        without = np.array([self.unit * (inverse(whole - a) @ (b - c)) for a, c in zip(jj, jr, strict=True)])
+        without = np.array(
+            [self.unit * (inverse(whole - a, self.tangent) @ (b - c)) for a, c in zip(jj, jr, strict=True)]
+        )
         return np.asarray(np.sqrt((FOLDS - 1) * np.mean((without - without.mean(axis=0)) ** 2, axis=0)))
 
     def rests(self, candidates: Sequence[Candidate]) -> Float:
@@ -149,7 +152,7 @@ class Scores:
         gains, before = np.zeros((FOLDS, len(candidates))), 0.0
         for part in range(FOLDS):
             b, mixed = jr.sum(axis=0) - jr[part], jc.sum(axis=0) - jc[part]
-            others = inverse(jj.sum(axis=0) - jj[part] + self.prior)
+            others = inverse(jj.sum(axis=0) - jj[part] + self.prior, self.tangent)
             plain, turned = others @ b, others @ mixed
             whole = cc.sum(axis=0) - cc[part] - np.einsum("pc,pc->c", mixed, turned)
             found = (cr.sum(axis=0) - cr[part] - b @ turned) / np.where(whole > 0, whole, np.inf)

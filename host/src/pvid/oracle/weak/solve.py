@@ -13,7 +13,7 @@ import numpy.typing as npt
 from pvid.oracle.weak import work
 from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float, TestFunctions
-from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.parameters import REDUNDANT, Parameters
 from pvid.oracle.weak.rows import EquationError, Unexplained, WeakRows, WhiteRows
 
 RIDGE = 1e-13  # added to the unit diagonal of what is inverted
@@ -21,6 +21,8 @@ _STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
 PASSES = 25  # of whitening at the present p
 _LEAST_PASSES = 4  # of them where the work is spent
 _STEPS = 30  # of Gauss-Newton between two whitenings
+_PIVOTS = 256  # of the bounds that act in a step
+_CURVED = 0.2  # of S: least curvature with that of the constraints
 SETTLED = 1e-8  # a step below this ends the search
 
 # An error of the equation is taken for real if it raises twice the logarithm of the likelihood by this much.
@@ -80,8 +82,10 @@ def misfit(moments: Moments, theta: list[Float]) -> float:
     return total
 
 
-def solved(s: Float, f: Float) -> Float:
-    """S^-1 f with S scaled to a unit diagonal."""
+def solved(s: Float, f: Float, tangent: Float | None = None) -> Float:
+    """S^-1 f with S scaled to a unit diagonal; C (C^T S C)^-1 C^T f with constraints, whose tangent is C."""
+    if tangent is not None:
+        return np.asarray(tangent @ solved(tangent.T @ s @ tangent, tangent.T @ f))
     scale = 1 / np.sqrt(np.maximum(s.diagonal(), 1e-300))
     return np.asarray(scale * np.linalg.solve(s * (scale[:, np.newaxis] * scale) + _ridge(len(s)), scale * f))
 
@@ -91,8 +95,10 @@ def _ridge(n: int) -> Float:
     return RIDGE * np.eye(n)
 
 
-def inverse(s: Float) -> Float:
-    """S^-1, S scaled to a unit diagonal."""
+def inverse(s: Float, tangent: Float | None = None) -> Float:
+    """S^-1, S scaled to a unit diagonal; C (C^T S C)^-1 C^T with constraints, whose tangent is C."""
+    if tangent is not None:
+        return np.asarray(tangent @ inverse(tangent.T @ s @ tangent) @ tangent.T)
     scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
     scaled = s * np.outer(scale, scale) + _ridge(len(s))
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
@@ -107,7 +113,7 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
     for k in range(steps):
         work.spend_step()
         s, f = normal(parameters, moments, p, theta)
-        step = _bounded_step(s + weak, f, parameters.blocked(p, f))
+        step = _step(parameters, p, s + weak, f)
         size = float(np.max(np.abs(step) / reach))
         step *= min(1.0, _STEP_LIMIT / max(size, 1e-300))
         first = size if k == 0 else first
@@ -123,6 +129,47 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
         if size < SETTLED:
             break
     return p, first
+
+
+def _step(parameters: Parameters, p: Float, s: Float, f: Float) -> Float:
+    """The least-squares step that keeps bounds and constraints, with the curvature of these where S stays positive."""
+    if not parameters.model.constraints:
+        return _bounded_step(s, f, parameters.blocked(p, f))
+    step, reactions = _tied_step(parameters, p, s, f)
+    curved = s + parameters.curvature(p, reactions)
+    tangent = parameters.tangent(p)
+    assert tangent is not None
+    root = tangent @ np.linalg.cholesky(inverse(tangent.T @ s @ tangent))
+    if np.linalg.eigvalsh(root.T @ curved @ root)[0] > _CURVED:
+        step, _ = _tied_step(parameters, p, curved, f)
+    return step
+
+
+def _tied_step(parameters: Parameters, p: Float, s: Float, f: Float) -> tuple[Float, Float]:
+    """The step, and the reactions of the constraints.
+
+    A bound holds its parameter iff its multiplier, the force that is left there, points outwards: Murty's least-index
+    pivots, which end for a positive S.
+    """
+    n = len(p)
+    a, (least, most) = parameters.constraints(p)[1], parameters.room(p)
+    low, high = np.zeros((2, n), np.bool_)
+    step, pull = np.zeros(n), np.zeros(len(a))
+    for _ in range(_PIVOTS):
+        held = low | high
+        rows = np.vstack([a, np.eye(n)[held]])
+        wanted = np.concatenate([np.zeros(len(a)), np.where(low, least, most)[held]])
+        base = np.linalg.pinv(rows, rcond=REDUNDANT) @ wanted
+        step = base + solved(s, f - s @ base, parameters.tangent(p, held))
+        pull = np.linalg.lstsq(rows.T, f - s @ step, rcond=REDUNDANT)[0]
+        own = np.zeros(n)
+        own[held] = pull[len(a) :]
+        wrong = np.flatnonzero(np.where(low, own > 0, np.where(high, own < 0, (step < least) | (step > most))))
+        if not wrong.size:
+            break
+        k = wrong[0]
+        low[k], high[k] = not held[k] and step[k] < least[k], not held[k] and step[k] > most[k]
+    return step, pull[: len(a)]
 
 
 def _bounded_step(s: Float, f: Float, blocked: npt.NDArray[np.bool_]) -> Float:
@@ -162,6 +209,11 @@ class Fit:
     def parameters(self) -> Parameters:
         """Of its model."""
         return self.rows.compiled.parameters
+
+    @property
+    def tangent(self) -> Float | None:
+        """Of its constraints."""
+        return self.parameters.tangent(self.p)
 
     def only(self, windows: slice | npt.NDArray[np.bool_]) -> Fit:
         """The same estimate and weights, with some of the windows."""

@@ -52,7 +52,7 @@ def near_zero(fit: Fit, se: Float) -> tuple[Bool, Float]:
         return none, se
     own = on_own_scale(fit, doubtful)
     information, neighbours = moments_of(own, own.designs())
-    covariance = covariance_of(information, neighbours)
+    covariance = covariance_of(information, neighbours, own.tangent)
     own_se = own.parameters.unit(own.p) * np.sqrt(np.diag(covariance))
     small = doubtful & (own_se <= _OF_GUESS * parameters.guess) & (fit.p * UNKNOWN <= own_se)
     return small, np.where(small, own_se, se)

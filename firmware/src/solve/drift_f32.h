@@ -1,0 +1,21 @@
+/* Constraints between rates of parameters, A(p) p' = 0, that need not be integrable: parameters drift along few
+ * directions D alone, as R and k do with the heat of a winding. Then only what the rows tell along D grows old:
+ *
+ *   M <- M - (1 - keep) M D (D^T M D)^-1 D^T M,    b likewise,    keep = exp(-1/(drift_s update_rate))
+ *
+ * the information form of a random walk along D of the variance (1/keep - 1) (D^T M D)^-1. Private to the core. Source:
+ * theory.md 4, Drift. */
+#ifndef PVID_DRIFT_F32_H
+#define PVID_DRIFT_F32_H
+
+#include "pvid/estimator.h"
+
+#if PVID_MAX_DRIFTS > 0
+
+/* Behind the step of a group: M, b and rr forget along each direction of the model, block by block. A direction of
+ * which a block knows nothing changes nothing. Cost: C, and three products with M for each direction. */
+void pvid_drift_forget_f32(pvid_estimator_f32 *self);
+
+#endif
+
+#endif

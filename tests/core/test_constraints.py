@@ -1,0 +1,202 @@
+"""Constraints between parameters: the estimate is that of sequential quadratic programming, in float64 and in C."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import sympy as sp
+from constraint_sets import SETS, SIGMA
+from weak_rig import assert_equals_the_twin
+
+import pvid
+from pvid.base.errors import PvidError
+from pvid.codegen.weak_library import weak_native
+from pvid.configuration.weak import config_to_identify, samples_of
+from pvid.core.native import Native
+from pvid.identification.analysis import analysed
+from pvid.identification.core import identify_in_c
+from pvid.identification.road import identified
+from pvid.model import Model
+from pvid.model.compiled import CompiledModel
+from pvid.model.identifiability import identifiable
+from pvid.model.report import check_report
+from pvid.model.together import with_own
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.solve import Moments, gauss_newton
+from pvid.rig.run import Recording
+
+Float = npt.NDArray[np.float64]
+SEEDS = range(3)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_float64_finds_the_optimum_of_sequential_quadratic_programming(name: str) -> None:
+    """Within 1e-3 standard errors; SLSQP itself ends within about 1e-6 of them."""
+    case, compiled = SETS[name], SETS[name].compiled()
+    parameters, n = Parameters(compiled), len(case.truth)
+    order = [int(str(one)[1:]) for one in compiled.rows[0].theta]
+    for seed in SEEDS:
+        rows, y = case.rows(seed)
+        m, b = rows.T @ rows / SIGMA**2, rows.T @ y / SIGMA**2
+        p = parameters.checked(None)
+        for _ in range(3):
+            p, size = gauss_newton(
+                parameters, Moments([(0,)], [m[np.ix_(order, order)]], [b[order]]), p, parameters.prior(p), 30
+            )
+        errors = np.sqrt(np.diag(np.linalg.inv(m)))
+        best = case.optimum(m, b, p[:n] + 0.5 * errors)
+        assert np.max(np.abs(p[:n] - best) / errors) < 1e-3, (seed, p, best)
+        assert np.max(np.abs(parameters.constraints(p)[0])) < 1e-10 and size < 1e-8
+
+
+def cored(name: str, seed: int) -> tuple[Float, Float, Float]:
+    """p of the core after all rows, settled; what it must be; standard errors of theta without constraints."""
+    case = SETS[name]
+    t, n, margins = case.theta, len(case.truth), case.margins
+    s = list(sp.symbols(f"s0:{len(margins)}", real=True))
+    tied = sp.lambdify([t + s], case.g(t) + [a - b for a, b in zip(case.h(t), s, strict=True)])
+    sd, low = (case.start, 0.01) if case.positive else ([10.0] * n, -99.0)
+    rows, y = case.rows(seed)
+    core = pvid.Estimator(
+        lambda p: p[:n], lambda p: np.eye(n, n + len(s)), start=[*case.start, *margins],
+        start_sd=[*sd, *[1.0] * len(s)], row_sd=SIGMA, lower=[low] * n + [0.0] * len(s), upper=[99.0] * (n + len(s)),
+        positive=[case.positive] * n + [False] * len(s), rate=50.0, constraints=lambda p: np.array(tied(p)),
+    ).add(rows, y)  # fmt: skip
+    for _ in range(60):
+        Native().library.pvid_estimator_iterate_f32(core._state)
+    m, b = rows.T @ rows / SIGMA**2, rows.T @ y / SIGMA**2
+    errors = np.sqrt(np.diag(np.linalg.inv(m)))
+    p = core.estimate.p
+    assert np.max(np.abs(tied(p))) < 1e-6  # a few ulp
+    return p[:n], case.optimum(m, b, p[:n] + 0.5 * errors), errors
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_core_stops_at_the_optimum(name: str) -> None:
+    """Within rounding: float32 sums of 400 rows leave up to 2e-4 standard errors."""
+    for seed in SEEDS:
+        p, best, errors = cored(name, seed)
+        assert np.max(np.abs(p - best) / errors) < 1e-3, (seed, p, best)
+
+
+def test_a_curvature_above_the_information_keeps_the_core_from_settling() -> None:
+    """The law neglects it (theory.md 4): with a reaction that large Gauss-Newton has no stable point here."""
+    p, best, errors = cored("sphere", 4)
+    assert 1e-2 < np.max(np.abs(p - best) / errors) < 0.3
+
+
+# ---- a mechanism: the torque constant is the back-EMF's, and the moment of inertia follows from it
+
+
+def motor(*more: str) -> CompiledModel:
+    """Constraints as text, in the unknowns' names."""
+    model = Model("motor with two constants")
+    w = model.sensor("w", "rad/s", noise=0.05, reach=300, gain_sd=0)
+    i = model.sensor("i", "A", noise=0.01, reach=10, gain_sd=0)
+    v = model.input("V", "V", "zoh", reach=24, gain_sd=0)
+    given = "R:ohm:1 L:H:1e-3 ke:V*s/rad:0.05 kt:N*m/A:0.05 J:kg*m^2:1e-4 b:N*m*s/rad:1e-4"
+    own = {n: model.unknown(n, unit, float(guess)) for n, unit, guess in (one.split(":") for one in given.split())}
+    own["tau"] = model.known("tau", "s", 1e-3)
+    own["R0"] = model.known("R0", "ohm", 1.0)
+    own["c"] = model.known("c", "V^2*s^2", 1e-3)
+    model.equation(own["L"] * i.d() + own["R"] * i + own["ke"] * w - v)
+    model.equation(own["J"] * w.d() + own["b"] * w - own["kt"] * i)
+    for one in more:
+        model.constraint(sp.sympify(one, locals=own))
+    return model.compiled("motor_two_constants")
+
+
+TRUTH = {"R": 1.2, "L": 2e-3, "ke": 0.06, "kt": 0.06, "J": 1.5e-4, "b": 2e-4}
+
+
+@cache
+def recording() -> Recording:
+    """8 s at 1 kHz of two square waves, exact between the samples."""
+    r, inductance, k, _, j, b = TRUTH.values()
+    a = np.array([[-r / inductance, -k / inductance], [k / j, -b / j]])
+    values, vectors = np.linalg.eig(a * 1e-3)
+    step = (vectors * np.exp(values)) @ np.linalg.inv(vectors)
+    force = np.linalg.solve(a, (step - np.eye(2)) @ [1 / inductance, 0.0]).real
+    t: Float = np.arange(8000, dtype=np.float64) * 1e-3
+    v = 6 * np.sign(np.sin(6.9 * t + 0.1)) + 4 * np.sign(np.sin(23.2 * t + 1))
+    x = np.zeros((len(t), 2))
+    for n, one in enumerate(v[:-1]):
+        x[n + 1] = step.real @ x[n] + force * one
+    rng = np.random.default_rng(0)
+    i, w = x[:, 0] + 0.01 * rng.normal(size=len(t)), x[:, 1] + 0.05 * rng.normal(size=len(t))
+    return Recording(np.asarray(t, np.float64), {"w": w, "i": i, "V": v}, 1000.0)
+
+
+def test_a_constraint_makes_identifiable_what_the_rows_do_not_determine() -> None:
+    free, tied = identifiable(motor()), identifiable(motor("ke - kt"))
+    assert free.rank == 5 and set(free.unidentifiable) == {"kt", "J", "b"} and tied.identifiable
+    assert "1 constraint ties ke and kt." in check_report(motor("ke - kt"))
+    assert not identifiable(motor("L - R*tau")).identifiable
+
+
+def test_tied_parameters_are_found_with_their_errors_in_float64_and_in_c() -> None:
+    """With twin and core of the same bits; the constraint is met, and its parameters share one error."""
+    answer = analysed(recording(), motor("ke - kt", "ke**2 - kt**2"))  # the second one is redundant
+    core = identify_in_c(answer)
+    for found in (answer.values, core.values):
+        assert found["ke"].value == pytest.approx(found["kt"].value, rel=1e-6)
+        assert found["ke"].se_noise == pytest.approx(found["kt"].se_noise, rel=1e-3)
+        for name, truth in TRUTH.items():
+            one = found[name]
+            assert one.value is not None and one.se_noise is not None, name
+            assert abs(one.value - truth) < 4 * one.se_noise and one.se_noise < 0.01 * truth, name
+    assert core.published and answer.found.verdict.word == "good"
+    config = config_to_identify(answer.model, answer.recording, answer.ranking)
+    records = assert_equals_the_twin(
+        weak_native(answer.model, config.design), config, samples_of(config, answer.recording.signals)[:4000]
+    )
+    p = records[0].p[-1]
+    assert p[2] != np.float32(0.05) and p[2] == pytest.approx(p[3], rel=1e-6)
+
+
+def test_a_refinement_that_keeps_no_constraints_is_refused() -> None:
+    answer = identified(recording(), motor("ke - kt"), refine=True, predict=False)
+    assert answer.refinement is not None and not answer.refinement.adopted
+    assert "which the refinement does not keep" in answer.refinement.text
+    with pytest.raises(PvidError, match="which fixed point does not keep"):
+        identify_in_c(answer, "q31")
+
+
+@pytest.mark.parametrize(
+    ("constraints", "message"),
+    [
+        (("ke - kt", "ke - 2*kt"), "no values near the start meet its constraints: do these contradict"),
+        (("ke**2 + kt**2 + c",), "no values near the start meet its constraints"),
+        (("L - R*tau", "ke - kt", "ke**2 - c", "J*R - c*tau", "b*tau - J", "R - R0"), "leave no parameter to"),
+    ],
+)
+def test_constraints_that_leave_nothing_are_refused(constraints: tuple[str, ...], message: str) -> None:
+    with pytest.raises(PvidError, match=message):
+        Parameters(motor(*constraints)).checked(None)
+
+
+def test_a_constraint_of_something_else_is_refused() -> None:
+    model = Model("refused")
+    x, k = model.sensor("x", "m", noise=1e-3), model.known("k", "N/m", 1.0)
+    m = model.unknown("m", "kg", 1.0)
+    for one, message in (
+        (x - 1, "contains a signal"), (k, "contains no unknown"), (m - k, "which is added to it"),
+        (m - sp.Symbol("z"), "z is not declared"),
+    ):  # fmt: skip
+        with pytest.raises(PvidError, match=message):
+            model.constraint(one)
+
+
+@pytest.mark.parametrize("constraints", [lambda p: p[0] ** 2 + 1, lambda p: [p[0] - 1, p[0] - 2]])
+def test_the_core_refuses_a_start_that_no_step_brings_to_the_constraints(constraints: object) -> None:
+    with pytest.raises(PvidError, match="do these contradict each other"):
+        pvid.Estimator(lambda p: p, start=[1.0, 1.0, 1.0], start_sd=[1.0] * 3, row_sd=1.0, constraints=constraints)  # type: ignore[arg-type]
+
+
+def test_several_recordings_have_a_constraint_each_between_their_own_parameters() -> None:
+    compiled = with_own(motor("ke - kt", "L - R*tau"), ["ke", "kt"], ["A", "B"])
+    assert [str(one) for one in compiled.constraints] == ["ke[A] - kt[A]", "ke[B] - kt[B]", "L - R*tau"]
+    assert [str(one) for one in compiled.alone.constraints] == ["ke - kt", "L - R*tau"]
