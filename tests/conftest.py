@@ -5,16 +5,20 @@ from __future__ import annotations
 import gc
 import os
 import subprocess
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
 from pendulum_plant import Simulation, simulate, standard_sensors
 from processes import children_of
 
+from bench.kinds import KINDS
 from pvid.base.freed_memory import keep_freed
 from pvid.core.native import Native
+from pvid.models.mechanisms import names
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -30,8 +34,9 @@ SLOW = """
     cli/cli cli/identify_in_c cli/identify_run oracle/missing identification/refined_search bench/random_models
     log/log show/page twin/weak_q31 identification/work board/memory identification/mechanism_advice
     codegen/strong_model cli/design_cost paper/paper cli/run_input bench/refine_mechanisms show/answer_figure
-    show/report board/stream bench/attack identification/refined_answer identification/refined_kinds oracle/samples
-    board/ports
+    show/report board/stream bench/attack cli/look deploy/commission identification/refined_answer
+    identification/refined_kinds oracle/samples
+    board/ports board/profile core/standard_errors identification/refined_kernel base/subprocesses
     identification/additions deploy/deploy twin/weak_f32 codegen/build bench/liar cli/demo_run identification/judge
     tools/pages core/trust_q31 cli/api identification/scale_errors board/targets identification/own_mechanisms
     core/core_q31 identification/refined twin/second_stage show/view board/refined_board tools/wheel
@@ -46,8 +51,15 @@ SLOW = """
     identification/wild_samples board/port bench/strong_mechanisms cli/output tools/proofs log/untrusted
     show/pictures tools/loops oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random
     bench/hard bench/verifying log/export log/text_table core/dead_zone tools/mutate bench/model_boards
-    deploy/deploy_avr identification/skew bench/build_choices
+    deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
+    design/differentiation identification/following codegen/fitted_sizes identification/gallery bench/cell
+    sim/pendulum oracle/weak_segments base/packages core/snapshot_weak oracle/failures rig/former_files oracle/zero
+    identification/weak_files_q31 bench/senseless_models model/mecanum core/weak_snapshot_q31
 """.split()
+# Of tests of every mechanism in bench.kinds those of these four: relaxations, an integral, an algebraic output; corners
+# and dry friction; an input that is a derivative; a hidden coordinate of order two. The others are tests of the night.
+BY_DAY = ("battery_2rc", "dc_motor", "kapitza", "two_mass_drive")
+_NONE = SimpleNamespace(params={})
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")
 
@@ -61,6 +73,7 @@ def pytest_configure(config: pytest.Config) -> None:
     gc.set_threshold(50_000, 20, 100)  # modules and SymPy's expressions live to the end: 5 % of the time found nothing
     config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and in `pvid bench long`")
     config.addinivalue_line("markers", "long: in `pvid bench long` alone")
+    config.addinivalue_line("markers", "by_day(number): its first cases; the others in `./tools/test night`")
     config.addinivalue_line("markers", "slow: left out of `./tools/test quick`")
     config.addinivalue_line(
         "markers", "night: what is handed out or measured, as its user has it; in `./tools/test night`"
@@ -76,8 +89,30 @@ def ticks(request: pytest.FixtureRequest) -> int:
     return length
 
 
+def of_night(items: list[pytest.Item]) -> Iterator[pytest.Item]:
+    """Of tests of the mechanisms of KINDS (a light test takes all there are) those that are not in BY_DAY; and cases
+    behind the first ones of a test that is marked so."""
+    swept: dict[tuple[str, str], list[tuple[str, pytest.Item]]] = {}
+    for item in items:
+        for argument, value in getattr(item, "callspec", _NONE).params.items():
+            if isinstance(value, str):
+                swept.setdefault((item.nodeid.partition("[")[0], argument), []).append((value, item))
+    for cases in swept.values():
+        if {*KINDS} <= {value for value, _ in cases} and not {*names()} <= {value for value, _ in cases}:
+            yield from (item for value, item in cases if value in {*KINDS} - {*BY_DAY})
+    seen: Counter[str] = Counter()
+    for item in items:
+        mark = item.get_closest_marker("by_day")
+        if mark is not None:
+            seen[item.nodeid.partition("[")[0]] += 1
+            if seen[item.nodeid.partition("[")[0]] > mark.args[0]:
+                yield item
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Puts the longest files first; within a file, and among the others, nothing moves."""
+    for item in of_night(items):
+        item.add_marker(pytest.mark.night)
     if not config.getoption("--long"):
         left_out = [item for item in items if item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=left_out)

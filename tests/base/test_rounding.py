@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pvid.base.rounding import prefix_of
+from pvid.base.rounding import prefix_of, with_error
 
 
 @pytest.mark.parametrize(
@@ -22,3 +22,19 @@ from pvid.base.rounding import prefix_of
 )
 def test_a_unit_takes_the_prefix_of_the_largest_number(size: float, unit: str, shown: tuple[str, float]) -> None:
     assert prefix_of(size, unit) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "shown"),
+    [
+        (9.50069, 0.0011, ("9.5007", "0.0011")),
+        (1.20001164, 8.5e-6, ("1.2000116", "0.0000085")),
+        (1.199957e-2, 6.2e-7, ("0.01199957", "0.00000062")),
+        (9.9997e-5, 1.3e-8, ("9.9997e-05", "1.3e-08")),
+        (1.2, 1e-12, ("1.2000000000000e+00", "1.0e-12")),
+        (123456.0, 780.0, ("123460", "780")),
+        (1.0, math.nan, ("1", "nan")),
+    ],
+)
+def test_a_value_is_shown_to_the_second_digit_of_its_error(value: float, error: float, shown: tuple[str, str]) -> None:
+    assert with_error(value, error) == shown

@@ -9,12 +9,13 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from bench.case import Case
+from bench import claims
+from bench.case import Case, counts
 from bench.command import CASES
 from bench.figures import DATA, IMAGES, PAGE, PARTS, Part, results_of
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import table_in
-from pvid.cli.results import Results, put_counts, put_results, read_results
+from pvid.cli.results import Results, put_results, read_results
 
 sys.path.insert(0, str(ROOT / "tools"))
 
@@ -54,18 +55,29 @@ def test_every_table_is_on_the_page_and_has_a_command_that_writes_it() -> None:
     linked = re.findall(r"\]\(benchmarks/([\w-]+)\.csv\)", PAGE.read_text(encoding="utf-8"))
     assert sorted(linked) == TABLES
     sizes = (ROOT / "host" / "src" / "pvid" / "cli" / "sizes.py").read_text(encoding="utf-8")
-    written = {name for one in CASES for name in one.tables}
+    written = {name for one in CASES for name in one.written}
     for name in TABLES:
-        assert name in written or re.sub(r"-\d+$", "", name) in written or f'"{name}"' in sizes, name
+        assert name == "claims" or name in written or re.sub(r"-\d+$", "", name) in written or f'"{name}"' in sizes, (
+            name
+        )
 
 
 @pytest.mark.parametrize("one", [one for one in CASES if len(one.options) == 2], ids=lambda one: one.name)
 def test_a_table_has_the_columns_that_its_command_writes(one: Case) -> None:
     if [option.name for option in one.options] == ["mechanism", "number"]:
         report = one.run(mechanism=frozenset(), number=1, advance=lambda: None)
-        assert tuple(name for name, _, _ in report.tables) == one.tables
+        assert tuple(name for name, _, _ in report.tables) == one.written
         for name, header, rows in report.tables:
             assert results_of(name).header == header and list(rows) == []
+
+
+def test_every_claim_has_a_command_a_page_and_a_test() -> None:
+    kept = results_of("claims")
+    assert kept.rows == list(claims.rows(CASES)), "write it anew: ./tools/pvid bench claims --data host/docs/benchmarks"
+    assert sorted(" ".join(kept.column("tables")).replace(" -", "").split()) == [
+        one for one in TABLES if one != "claims"
+    ]
+    assert all(kept.column("quoted by")) and "-" not in kept.column("short form")
 
 
 def test_the_page_is_short() -> None:
@@ -82,7 +94,7 @@ def test_what_was_written_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_without_a_folder_a_table_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    put_counts(None, "a", (("runs", 3),))
+    put_results(None, *counts("a", [("runs", 3)]))
     assert capsys.readouterr().out == "| what | number |\n|---|---|\n| runs | 3 |\n"
 
 

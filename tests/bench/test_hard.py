@@ -7,7 +7,7 @@ import pytest
 
 from bench.hard import CASES, HEADER, Case, Outcome, row, run_case, simulation_for
 
-NAMES = ("kapitza", "dc_motor")
+NAMES = ("kapitza", pytest.param("dc_motor", marks=pytest.mark.night))
 
 
 def case(label: str) -> Case:

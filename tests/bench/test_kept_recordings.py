@@ -12,8 +12,7 @@ from scipy.io import savemat
 from scipy.optimize import curve_fit
 
 from bench import recorded_rigs
-from bench.kept_recordings import KEPT
-from bench.recordings import MECHANISMS, PIECES, Package, Piece, Source, write_source
+from bench.recordings import KEPT, MECHANISMS, PIECES, Piece, Source, write_source
 from pvid.base.errors import PvidError
 
 NAMES = [source.name for source in KEPT]
@@ -84,7 +83,6 @@ def test_origin_and_licence_stand_beside_the_pieces(name: str) -> None:
     one = source(name)
     note = (MECHANISMS / name / "PROVENANCE.md").read_text(encoding="utf-8")
     licence = (MECHANISMS / name / "LICENSE.txt").read_text(encoding="utf-8")
-    assert isinstance(one.origin, Package)
     assert f"{one.origin.name} {one.origin.version}" in note
     assert one.licence in note and one.note in note and one.identify.path in note
     assert one.licence.split(", ", 1)[1] in licence
@@ -114,7 +112,6 @@ def archive(tmp_path: Path, one: Source, path: str) -> Path:
 
 def test_switched_motor_is_cut_less_its_value_at_rest(tmp_path: Path) -> None:
     one = source("motor_generator")
-    assert isinstance(one.origin, Package)
     place = archive(tmp_path, one, one.identify.path)
     y = np.append(np.full(4000, -143.8), np.linspace(0.0, 3000.0, 2001))
     np.savetxt(place, y)

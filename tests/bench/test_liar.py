@@ -41,7 +41,7 @@ def test_the_table_of_results_has_no_defect() -> None:
     assert kept["largest memory of the logger, kB"] < MOST_KB and kept["latest end of the logger, ms"] < 1000 * LATEST_S
 
 
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", [0, 1, *(pytest.param(one, marks=pytest.mark.night) for one in (2, 3))])
 def test_no_lie_ends_a_recording_or_what_looks_on(part: int, tmp_path: Path) -> None:
     """Every fourth behaviour: recorded with all views, exit code, what was honest read back."""
     behaviours = list(BEHAVIOURS.values())[part::4]

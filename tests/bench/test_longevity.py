@@ -13,7 +13,7 @@ def of(name: str) -> Disturbance:
     return next(one for one in DISTURBANCES if one.name == name)
 
 
-@pytest.mark.parametrize("name", ["kapitza", "dc_motor"])
+@pytest.mark.parametrize("name", ["kapitza", pytest.param("dc_motor", marks=pytest.mark.night)])
 @pytest.mark.parametrize("what", ["all signals stand still", "samples missing", "a sensor keeps its value"])
 def test_an_answer_comes_back_or_raises_its_alarm(name: str, what: str) -> None:
     for lane in LANES:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,12 @@ from bench.random_rigs import IN_C, KINDS, random_rig
 WHOLE = (2, 65, 1001, 1003)
 ANALYSED = (0, 3, 4, 62, 64, 66, 70)
 
+
+def of_night(seeds: Sequence[object], by_day: int) -> list[Any]:
+    """All but the first."""
+    return [*seeds[:by_day], *(pytest.param(one, marks=pytest.mark.night) for one in seeds[by_day:])]
+
+
 # Seeds of rigs that failed once, and why.
 CURED = {
     "the current is sampled before the voltage jumps": 1097,
@@ -27,14 +35,14 @@ CURED = {
 }
 
 
-@pytest.mark.parametrize("seed", [*WHOLE[:2], *(pytest.param(seed, marks=pytest.mark.night) for seed in WHOLE[2:])])
+@pytest.mark.parametrize("seed", of_night(WHOLE, 1))
 def test_a_random_rig_goes_the_whole_road(seed: int) -> None:
     road = road_of(seed)
     assert road.failures == []
     assert {"identify", "f32", "q31", "build", "compile", "deploy", "fixed deploy"} <= set(road.reached)
 
 
-@pytest.mark.parametrize("seed", ANALYSED)
+@pytest.mark.parametrize("seed", of_night(ANALYSED, 3))
 def test_a_random_rig_is_identified_and_refined_in_float64(seed: int) -> None:
     road = road_of(seed, in_c=False)
     assert road.failures == []
@@ -42,13 +50,14 @@ def test_a_random_rig_is_identified_and_refined_in_float64(seed: int) -> None:
     assert road.outcome != "refused"
 
 
-@pytest.mark.parametrize("why", CURED)
+@pytest.mark.parametrize("why", of_night(list(CURED), 1))
 def test_a_rig_that_failed_once_is_right(why: str) -> None:
     road = road_of(CURED[why], in_c=False)
     assert road.failures == []
     assert road.outcome == "good"
 
 
+@pytest.mark.night
 def test_a_drag_that_ran_down_to_0_starts_the_core_within_float32() -> None:
     road = road_of(6028)
     assert road.failures == []

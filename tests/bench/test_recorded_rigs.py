@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bench import recorded_rigs
-from bench.kept_recordings import KEPT
-from bench.recordings import SOURCES
+from bench.recordings import KEPT, SOURCES
 from pvid.models.drive import Sines
 from pvid.models.simulated_rig import SimulatedRig
 from pvid.rig.run import Recording, write_recording

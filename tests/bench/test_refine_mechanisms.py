@@ -61,7 +61,7 @@ def test_few_ticks_for_a_step_have_more_jobs_each_and_too_slow_samples_are_refus
         refine_settings(made, simulation.run(), 50.0, simulation.truth, 2.0)
 
 
-@pytest.mark.parametrize("name", ["dc_motor", "cart_pendulum"])
+@pytest.mark.parametrize("name", ["dc_motor", pytest.param("cart_pendulum", marks=pytest.mark.night)])
 def test_sharp_friction_is_refined_to_the_bound(name: str) -> None:
     """The weak form's errors are 1 to 30 bounds, most of them of the reversals."""
     case = Case.of(name, 1000.0)
@@ -120,7 +120,7 @@ def test_a_gain_that_is_no_number_is_refused(masses: Case) -> None:
     [
         ("dc_motor", 2500),  # an input that is held for a step, an angle without whole turns, two outputs
         pytest.param("cart_pendulum", 3600, marks=pytest.mark.long),  # an input that is held within a step
-        ("two_mass_drive", 1700),  # a hidden coordinate
+        pytest.param("two_mass_drive", 1700, marks=pytest.mark.night),  # a hidden coordinate
         ("battery_2rc", 6800),  # the integral of an input, relaxations, an output by an algebraic equation
     ],
 )
@@ -175,6 +175,7 @@ def test_each_mechanism_is_in_a_table_with_a_cell_for_each_column() -> None:
     assert [len(row) for row in rows] == [len(HEADER)] * 6 and rows[0][8] == "1 of 1"
 
 
+@pytest.mark.night
 def test_no_published_estimate_of_an_imperfect_motor_is_far_off() -> None:
     rows = list(imperfect_rows("dc_motor", Case.of("dc_motor", 1000.0), 1))
     assert all(len(row) == len(IMPERFECT) and row[-1] == "0" for row in rows)

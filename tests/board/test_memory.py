@@ -82,12 +82,14 @@ def play_hostile(library: Path, compiler: Path, *arguments: str) -> subprocess.C
     )
 
 
+@pytest.mark.night
 def test_hostile_runs_of_the_library_are_clean(library: Path, compiler: Path) -> None:
     done = play_hostile(library, compiler)
     assert done.returncode == 0, done.stderr[-5000:]
     assert int(done.stdout.split()[0]) > 230_000
 
 
+@pytest.mark.night
 def test_write_behind_an_array_is_found(library: Path, compiler: Path) -> None:
     done = play_hostile(library, compiler, "--planted")
     assert done.returncode != 0
@@ -116,7 +118,9 @@ def start_by(monkeypatch: pytest.MonkeyPatch, script: Path, prefix: str) -> None
     monkeypatch.setattr(target, "build_image", build)
 
 
-@pytest.mark.parametrize(("form", "core"), KINDS)
+@pytest.mark.parametrize(
+    ("form", "core"), [KINDS[0], *(pytest.param(*one, marks=pytest.mark.night) for one in KINDS[1:])]
+)
 def test_the_stream_program_reads_nothing_that_was_not_written(
     form: str, core: str, native: Native, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,7 +134,7 @@ def test_the_stream_program_reads_nothing_that_was_not_written(
     assert verdict.equal, verdict.text
 
 
-@pytest.mark.parametrize(("form", "core"), [("weak", "f32"), ("strong", "q31")])
+@pytest.mark.parametrize(("form", "core"), [("weak", "f32"), pytest.param("strong", "q31", marks=pytest.mark.night)])
 def test_the_stream_program_is_clean_under_the_sanitizers(
     form: str, core: str, native: Native, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,6 +62,7 @@ def test_the_cost_of_both_stages_is_measured_for_a_recording(tmp_path: Path) -> 
     assert printed["first_s"] <= light["first_s"] < printed["ticks"] / 1000  # the weak form leaves it fewer ticks
 
 
+@pytest.mark.night
 def test_the_cost_of_a_shipped_rig_is_that_of_sizes() -> None:
     (found,) = json.loads(pvid("design", "--model", "rigid_body", "--on", BOARD, "--json").stdout)["cost"]
     footprint, _ = sizes.measure(sizes.Configuration(BOARDS[BOARD], sizes.WEAK, "f32", "rigid_body"))
@@ -88,6 +89,7 @@ def test_a_simulation_of_the_guess_is_replayed_in_the_core_that_is_asked_for(rig
     assert found["core"] == "q31" and 0 < found["mean"] < found["longest"] and 0 < found["ticks"] <= 10_000
 
 
+@pytest.mark.night
 def test_the_reason_why_there_is_no_second_stage_is_that_of_model_build(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -120,7 +121,18 @@ def test_a_result_is_saved_and_loaded(found: pvid.Result, tmp_path: Path) -> Non
         again.report(tmp_path / "a.html")
     with pytest.raises(PvidError, match="heated_plate"):  # a file never chooses what runs
         pvid.load(path)
-    assert json.loads(path.read_text())["parameters"]["C"]["value"] == found["C"].value
+    saved = json.loads(path.read_text())
+    assert saved["parameters"]["C"]["value"] == found["C"].value
+    saved["saved"]["covariance"] = [[1.0]]
+    path.write_text(json.dumps(saved))
+    with pytest.raises(PvidError, match="covariance and parameters differ in number"):
+        pvid.load(path, model=plate())
+
+
+def test_a_frame_needs_pandas(found: pvid.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(PvidError, match="to_frame needs pandas"):
+        found.to_frame()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"saved": 3}', '{"saved": {"rig": ""}}'])

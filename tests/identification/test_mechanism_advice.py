@@ -170,6 +170,7 @@ def test_input_that_never_changes_is_named() -> None:
         ("rigid_body", ["w0", "w1", "w2"], 30 / np.pi, "rpm"),
         ("two_link_arm", ["q1", "q2"], 180 / np.pi, "deg"),
         ("two_link_arm", ["t1", "t2"], 1e3, "mN*m"),
+        ("rigid_body", ["m0", "m1", "m2"], 1e3, "mN*m"),  # as would t in ms, at 1 MHz
     ],
 )
 def test_columns_that_are_all_in_another_unit_are_named_together(
@@ -185,6 +186,23 @@ def test_columns_that_are_all_in_another_unit_are_named_together(
     si = model.signal(signals[0]).unit
     typed = ",".join(f"{one}={one}:{unit}" for one in signals)
     assert answer.advice == (f"{listed(signals)} seem to be in {unit}, not {si}: --columns {typed}",)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "scale", "what"),
+    [
+        ("dc_motor", "ms", 1e3, "ms"),
+        ("rigid_body", "d", 1 / 86_400, "d"),
+        ("free_pendulum", "1/32768", 32_768.0, "ticks of 32768 Hz"),
+        ("cooling", "d", 1 / 86_400, "d"),
+    ],
+)
+def test_unit_of_the_time_is_named(name: str, unit: str, scale: float, what: str) -> None:
+    model, simulation = compiled_of(name), simulation_of(name)
+    run = {key: values[:6000] for key, values in simulation.run(3).items()}
+    t = scale * run.pop("t")
+    found = analysed(Recording(t, run, simulation.rig.sample_rate / scale), model)
+    assert advice_on(found) == (f"t seems to be in {what}, not s: --columns t=t:{unit}",)
 
 
 STEP = 2 * np.pi / 2**14

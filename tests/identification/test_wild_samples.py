@@ -124,6 +124,23 @@ def test_error_codes_of_any_signal_are_interpolated(name: str, code: float) -> N
             without_wild_samples(replace(recording, signals={**recording.signals, one.name: x}), model)
 
 
+def test_single_wild_samples_of_a_measured_current_that_drives_are_interpolated_but_true_pulses_stay() -> None:
+    """The voltage moves with a pulse of the cell's current, and not with interference."""
+    recording, model = recorded("battery_2rc"), compiled_of("battery_2rc")
+    random = np.random.default_rng(5)
+    i = recording.signals["i"].copy()
+    places = random.choice(np.arange(10, len(i) - 10, 5), 40, replace=False)
+    i[places] += random.choice([-1, 1], 40) * random.uniform(3, 20, 40) * np.ptp(i)
+    found = without_wild_samples(replace(recording, signals={**recording.signals, "i": i}), model)
+    assert np.abs(found.signals["i"]).max() <= np.abs(recording.signals["i"]).max()
+    assert len(found.notes) == 1 and found.notes[0].startswith("40 samples of i are far from those about it (")
+    pulses = 0.01 * random.standard_normal(len(i))
+    pulses[places] = 5.0
+    v = np.rint((3.7 - 0.02 * pulses) / 1e-4) * 1e-4 + 1e-4 * random.integers(-1, 2, len(i))
+    pulsed = replace(recording, signals={**recording.signals, "i": pulses + 1e-3 * random.random(len(i)), "v": v})
+    assert without_wild_samples(pulsed, model).notes == ()
+
+
 def test_strokes_of_an_input_are_no_error_codes() -> None:
     """A hammer: a force that is 0 but for strokes of many sizes; an input that has two levels."""
     recording, model = recorded("rigid_body"), compiled_of("rigid_body")

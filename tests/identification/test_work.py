@@ -54,6 +54,7 @@ def chattering(run: Run) -> dict[str, Float]:
     return {**run, "phi": phi, "i": random.normal(0, 1, n)}
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("bad", "advice"),
     [

@@ -171,6 +171,7 @@ def sample() -> list[Case]:
     return campaign(6, 5)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("number", range(6))
 def test_sample_of_the_campaign_has_no_silent_wrong_answer(number: int) -> None:
     case = sample()[number]
@@ -222,6 +223,7 @@ def test_perfect_rig_lacks_nothing(name: str) -> None:
 LSB = 2 * np.pi / 2**12
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("name", "key", "signal", "size", "words", "expected"),
     [

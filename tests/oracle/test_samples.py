@@ -78,6 +78,20 @@ def test_sensor_that_clips_is_named(limit: float, side: str) -> None:
     assert not {"sensor", "missing", "friction"} & set(found)
 
 
+def test_record_of_a_drive_that_clips_is_noted_where_the_equations_do_not_explain_the_run() -> None:
+    """Not where the drive itself may end there: of what comes to it in steps, or with equations that hold."""
+    shipped = simulation_of("dc_motor")
+    run = shipped.run(3)
+    identified = [
+        texts(identify(shipped.model, {**run, "V": V}, 1000.0, design=WeakDesign(1000.0, 1.0, 12, 6)))
+        for V in (np.clip(run["V"], -4, 4), run["V"])
+    ]
+    assert identified[0]["clipped"].endswith("does what records it clip, or does V itself end there?")
+    assert "V stands at its largest value, 4 V, in " in identified[0]["clipped"] and "clipped" not in identified[1]
+    steps = motor(1000.0, lambda run: {"V": np.clip(run["V"], -3, 3)})
+    assert "clipped" not in steps
+
+
 def flywheel() -> CompiledModel:
     model = Model("flywheel")
     u = model.input("u", "N*m", hold="zoh", reach=1, gain_sd=0)

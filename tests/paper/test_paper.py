@@ -106,6 +106,7 @@ def test_law_5_by_hand_is_that_in_float64() -> None:
     assert np.allclose(one.p, TRUTH, rtol=0.15) and not np.allclose(one.p, begun.p, rtol=0.05)
 
 
+@pytest.mark.by_day(4)
 @pytest.mark.parametrize("options", COMPILERS.values(), ids=COMPILERS)
 @pytest.mark.parametrize("core", CORES)
 def test_other_compilers_keep_the_bits(core: Core, options: tuple[str, ...], tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ from mcap_ros2.writer import Writer as Ros2Writer
 
 from pvid.api.data import named
 from pvid.base.errors import PvidError
+from pvid.identification.survey import surveyed
 from pvid.rig.columns import Channel, Columns
 from pvid.rig.run import Recording, read_recording, recording_of_arrays
 
@@ -145,6 +146,50 @@ def test_parquet_and_arrow(tmp_path: Path) -> None:
     stamped = pyarrow.table({"time": NANOSECONDS, "F": F, "x": X, "note": ["a"] * ROWS})
     pyarrow.parquet.write_table(stamped, tmp_path / "stamped.parquet")
     assert_same(read_recording(tmp_path / "stamped.parquet", None, columns("t=time")))
+
+
+OF_ROWS = list(zip(T.tolist(), F.tolist(), X.tolist(), strict=True))
+IN_COMMAS = {
+    key: ";".join(f"{one:.5f}" for one in values).replace(".", ",")
+    for key, values in zip("tFx", (T, F, X), strict=True)
+}
+TURNED = {
+    "rows of one time together": "time,name,value\n" + "".join(f"{t!r},F,{f}\n{t!r},x,{x}\n" for t, f, x in OF_ROWS),
+    "one signal after the other": "time;signal;value\n"
+    + "".join(f"{t!r};F;{f}\n" for t, f, _ in OF_ROWS)
+    + "".join(f"{t!r};x;{x}\n" for t, _, x in OF_ROWS),
+    "a data base's": "#group,false\n,result,table,time,value,field,measurement\n"
+    + "".join(
+        f",,0,2024-05-02T10:00:{t:06.3f}Z,{f},F,rig\n,,1,2024-05-02T10:00:{t:06.3f}Z,{x},x,rig\n" for t, f, x in OF_ROWS
+    ),
+    "with a counter": "id,time,name,value\n"
+    + "".join(f"{k},{t!r},F,{f}\n{k + 1},{t!r},x,{x}\n" for k, (t, f, x) in enumerate(OF_ROWS)),
+    "a row for each signal": "\n".join(
+        f"{name},{','.join(map(repr, one.tolist()))}" for name, one in zip(("time", "F", "x"), (T, F, X), strict=True)
+    ),
+    "such rows with decimal commas": "\n".join(
+        f"{'time' if key == 't' else key};{text}" for key, text in IN_COMMAS.items()
+    ),
+}
+
+
+@pytest.mark.parametrize("case", TURNED)
+def test_turned_tables(case: str, tmp_path: Path) -> None:
+    """Also those that `look` surveys, which needs no names."""
+    (tmp_path / "run.csv").write_text(TURNED[case], encoding="utf-8")
+    found = read_recording(tmp_path / "run.csv", None, columns("t=time"))
+    assert_same(found)
+    assert "a row for each signal" in found.notes[0] and len(found.notes) == 1
+    assert surveyed(tmp_path / "run.csv").names == ("time", "F", "x")
+    with pytest.raises(PvidError, match=re.escape("no column 'time' for t and y (m) among 'stamp', 'F', 'x'")):
+        (tmp_path / "run.csv").write_text(TURNED[case].replace("time", "stamp"), encoding="utf-8")
+        read_recording(tmp_path / "run.csv", None, Columns.parse("t=time", (*CHANNELS, Channel("y", "m"))))
+
+
+def test_a_table_with_a_mode_beside_each_row_is_not_turned(tmp_path: Path) -> None:
+    modes = "time,mode,y\n" + "".join(f"{t!r},{'run' if t < 0.2 else 'stop'},{x}\n" for t, _, x in OF_ROWS)
+    (tmp_path / "run.csv").write_text(modes, encoding="utf-8")
+    assert surveyed(tmp_path / "run.csv").names == ("time", "mode", "y")
 
 
 @pytest.mark.parametrize("title", [None, "Lab 3"])

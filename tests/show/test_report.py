@@ -114,6 +114,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", [*SHIPPED, *OWN])
 def test_report_of_every_mechanism_has_the_values_of_the_result_and_all_sections(
     runs: Path, name: str, tmp_path: Path

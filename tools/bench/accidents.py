@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bench.case import columns
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
 from pvid.model.compiled import CompiledModel
@@ -22,15 +23,9 @@ SEEDS = 2
 WRONG = 4.0  # standard errors
 SECONDS = 20.0  # of a run at 1 kHz; so many samples at another rate
 MECHANISMS = ("kapitza", "rigid_body")
-HEADER = (
-    "mechanism",
-    "accident",
-    "answered",
-    "largest error: median, s.e.",
-    "largest, s.e.",
-    "largest, %",
-    "warned",
-    "wrong, no warning",
+HEADER = columns(
+    "mechanism | accident | answered | largest error: median, s.e. | largest, s.e. | largest, % | warned | wrong,"
+    " no warning"
 )
 _AT = 0.5  # of the run: where it happens
 

@@ -33,7 +33,7 @@ from types import FrameType
 import click
 import numpy as np
 
-from bench.case import Advance, Report
+from bench.case import Advance, Report, columns
 from bench.kinds import KINDS as KINDS_OF_MECHANISM
 from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.cli import main as cli
@@ -45,15 +45,8 @@ from pvid.sim.simulated_run import simulation_of, write_simulated_run
 
 KINDS = ("rigs", "runs", "commands")
 MECHANISMS = KINDS_OF_MECHANISM
-HEADER = (
-    "attacked with",
-    "mutants",
-    "seed",
-    "answered",
-    "nothing identified",
-    "refused",
-    "defects",
-    "longest, s of processor",
+HEADER = columns(
+    "attacked with | mutants | seed | answered | nothing identified | refused | defects | longest, s of processor"
 )
 
 LONGEST_S = 60  # of processor time, of one command: the run is a few seconds long

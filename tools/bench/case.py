@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import click
+
+from pvid.base.errors import PvidError
 
 Advance = Callable[[], None]  # called at each step
 Table = tuple[str, Sequence[str], Iterable[Sequence[str]]]  # name of the file, header, rows of cells
@@ -29,6 +32,11 @@ class Report:
     said: Sequence[str] = ()
 
 
+def columns(text: str) -> tuple[str, ...]:
+    """A header, of headings between bars."""
+    return tuple(one.strip() for one in text.split(" | "))
+
+
 def counts(name: str, numbers: Iterable[tuple[str, int]]) -> Table:
     """The table of one run: what was counted, and the number."""
     return name, ("what", "number"), [(what, str(number)) for what, number in numbers]
@@ -41,21 +49,56 @@ def option(name: str | list[str], default: Any, about: str = "", least: int = 1,
     return click.Option(names, default=default, show_default=True, help=about, **{**kind, **more})
 
 
+def chosen(mechanism: Collection[str], usual: Sequence[str] = ()) -> tuple[str, ...]:
+    """The mechanisms of a case; (): those that are usual for it, or all.
+
+    Raises
+    ------
+    PvidError
+        When there is none of a name.
+    """
+    from pvid.models.mechanisms import names
+
+    if unknown := set(mechanism) - set(names()):
+        raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
+    return tuple((usual or names()) if mechanism == () else mechanism)
+
+
 @dataclass(frozen=True)
 class Case:
     """A measurement: `./tools/pvid bench NAME`.
 
     Attributes
     ----------
-    claim : what its tables are evidence of, as pages have it
-    run : of the options by name and `advance`, which is called at each step
+    claim : what its tables are evidence of
+    place : module of this folder with its `report`, or MODULE:FUNCTION, of the options and `advance`
     tables : that it writes, without the endings that options give them
-    short : of tests/: its short form
+    rows : in place of a report: tables, their headers' names and those of the functions of their rows, which take
+        mechanisms, a number and `advance`
+    usual : mechanisms of `rows`, where none is named
     """
 
     name: str
     claim: str
-    run: Callable[..., Report]
-    tables: tuple[str, ...]
+    place: str
+    tables: tuple[str, ...] = ()
     options: Sequence[click.Parameter] = ()
-    short: str = ""
+    rows: tuple[tuple[str, str, str], ...] = ()
+    usual: tuple[str, ...] = ()
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """Names of all its tables."""
+        return self.tables + tuple(name for name, _, _ in self.rows)
+
+    def run(self, **given: Any) -> Report:
+        """Measures."""
+        module, _, function = self.place.partition(":")
+        found = import_module(f"bench.{module}")
+        if not self.rows:
+            report: Report = getattr(found, function or "report")(**given)
+            return report
+        given = {"names": chosen(given.pop("mechanism"), self.usual), **given}
+        return Report(
+            [(name, getattr(found, of), getattr(found, rows)(*given.values())) for name, of, rows in self.rows]
+        )

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import import_module
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 import click
 
-from bench.case import DIFFERS, Advance, Case, Report, option
+from bench.case import DIFFERS, Case, option
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
-from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.cli.page_table import UPDATE, put_table
 from pvid.cli.results import DATA, put_results
@@ -21,35 +18,6 @@ from pvid.cli.results import DATA, put_results
 @click.group()
 def bench() -> None:
     """Measures what the README and the benchmark pages claim and prints it as tables."""
-
-
-def _of(module: str, name: str = "report") -> Callable[..., Report]:
-    """A function of a module of this folder, which is imported when it is called."""
-    return lambda **given: getattr(import_module(f"bench.{module}"), name)(**given)
-
-
-def _each(module: str, *tables: tuple[str, str, str], usual: tuple[str, ...] = ()) -> Callable[..., Report]:
-    """Tables of functions of names of mechanisms, a number and `advance`: name, its header's, that of its rows.
-
-    Parameters
-    ----------
-    usual : mechanisms, where none is named
-    """
-
-    def run(mechanism: tuple[str, ...], number: int, advance: Advance) -> Report:
-        from pvid.models.mechanisms import names
-
-        if unknown := set(mechanism) - set(names()):
-            raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
-        some = (usual or tuple(names())) if mechanism == () else mechanism
-        found = import_module(f"bench.{module}")
-        if not tables:
-            return Report(found.tables(some, number, advance))
-        return Report(
-            [(one, getattr(found, header), getattr(found, of)(some, number, advance)) for one, header, of in tables]
-        )
-
-    return run
 
 
 def _number(name: str, default: int, about: str = "Runs of each case.") -> tuple[click.Option, ...]:
@@ -67,88 +35,92 @@ CASES = (
     Case(
         "mechanisms",
         "Errors in float64 beside the Cramer-Rao bound, and of imperfect rigs.",
-        _each("mechanisms"),
+        "mechanisms",
         _ACCURACY,
         _SEEDS,
     ),
     Case(
         "weak",
         "Errors of the weak form in C beside float64, and in fixed point beside float32.",
-        _each("weak", ("weak", "HEADER", "table"), ("weak-q31", "FIXED_HEADER", "fixed_table")),
-        ("weak", "weak-q31"),
-        _SEEDS,
+        "weak",
+        options=_SEEDS,
+        rows=(
+            ("weak", "HEADER", "table"),
+            ("weak-q31", "FIXED_HEADER", "fixed_table"),
+        ),
     ),
     Case(
         "refine-mechanisms",
         "Both stages in C: errors beside the Cramer-Rao bound.",
-        _each(
-            "refine_mechanisms",
+        "refine_mechanisms",
+        options=_SEEDS,
+        rows=(
             ("refine-mechanisms", "HEADER", "refined_rows"),
             ("refine-friction", "IMPERFECT", "friction_rows"),
         ),
-        ("refine-mechanisms", "refine-friction"),
-        _SEEDS,
     ),
     Case(
         "hard",
         "Coarse sensors, noise, little drive, no motion: what is published, and what is wrong.",
-        _each("hard", ("hard", "HEADER", "rows")),
-        ("hard",),
-        _SEEDS,
+        "hard",
+        options=_SEEDS,
+        rows=(("hard", "HEADER", "rows"),),
     ),
     Case(
         "accidents",
         "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them.",
-        _each("accidents", ("accidents", "HEADER", "rows"), usual=("kapitza", "rigid_body")),
-        ("accidents",),
-        _number("--seeds", 2),
+        "accidents",
+        options=_number("--seeds", 2),
+        rows=(("accidents", "HEADER", "rows"),),
+        usual=("kapitza", "rigid_body"),
     ),
     Case(
         "longevity",
         "Millions of ticks of every disturbance, with and without forgetting.",
-        _each("longevity", ("longevity", "HEADER", "rows")),
-        ("longevity",),
-        _number("--ticks", 1_000_000, "Of each run."),
+        "longevity",
+        options=_number("--ticks", 1_000_000, "Of each run."),
+        rows=(("longevity", "HEADER", "rows"),),
     ),
     Case(
         "verify",
         "What `pvid verify` takes for a long log, of each identifier that a board streams.",
-        _each("verifying", ("verify", "HEADER", "rows"), usual=("kapitza", "dc_motor", "furuta", "battery_2rc")),
-        ("verify",),
-        _number("--ticks", 3_600_000, "Of each log."),
+        "verifying",
+        options=_number("--ticks", 3_600_000, "Of each log."),
+        rows=(("verify", "HEADER", "rows"),),
+        usual=("kapitza", "dc_motor", "furuta", "battery_2rc"),
     ),
     Case(
         "compare-methods",
         "Weak form, strong form, output error and pysindy's weak form (needs pysindy).",
-        _each("methods", ("compare-methods", "HEADER", "rows")),
-        ("compare-methods",),
-        _number("--seeds", 3),
+        "methods",
+        options=_number("--seeds", 3),
+        rows=(("compare-methods", "HEADER", "rows"),),
     ),
     Case(
         "strong-mechanisms",
         "The strong form on boards: its bits and the cost of a tick.",
-        _each("strong_mechanisms", ("strong-mechanisms", "HEADER", "rows")),
-        ("strong-mechanisms",),
-        _ONCE,
+        "strong_mechanisms",
+        options=_ONCE,
+        rows=(("strong-mechanisms", "HEADER", "rows"),),
     ),
     Case(
         "strong-fixed",
         "The same of the strong form in fixed point.",
-        _each("strong_mechanisms", ("strong-fixed", "FIXED_HEADER", "fixed_rows")),
-        ("strong-fixed",),
-        _ONCE,
+        "strong_mechanisms",
+        options=_ONCE,
+        rows=(("strong-fixed", "FIXED_HEADER", "fixed_rows"),),
     ),
     Case(
         "cycles",
         "Clock cycles of a tick on a real core, CV32E40P, simulated from its RTL by verilator with ideal memory.",
-        _of("cycles"),
+        "cycles",
         ("cycles",),
         (_PROCESSES,),
     ),
     Case(
         "missing",
         "Models that lack something: what is warned of, what is named, and what the standard errors contain.",
-        _of("lacking"),
+        "lacking",
         ("missing", "missing-sum", "missing-campaign"),
         (
             option("--clean", 20, "Runs of each plant as it is."),
@@ -159,20 +131,20 @@ CASES = (
     Case(
         "cell",
         "RC models on a cell that is no RC circuit; --write makes its records (needs PyBaMM).",
-        _of("cell"),
+        "cell",
         ("cell",),
         (click.Option(["--write"], type=_FOLDER),),
     ),
     Case(
         "build-choices",
         "What each choice of a build of the weak form takes and gives, on the pendulum's shipped rig.",
-        _of("build_choices"),
+        "build_choices",
         ("build-choices",),
     ),
     Case(
         "model-boards",
         "The weak form of every mechanism on emulated boards, in both cores: its bits and the cost of a tick.",
-        _of("model_boards"),
+        "model_boards",
         ("model-boards",),
         (
             click.Option(
@@ -187,7 +159,7 @@ CASES = (
         "kept-recordings",
         "The real rigs whose recordings are in tests/data/recordings, likewise; --cut writes the pieces anew from the "
         "unpacked archives ARCHIVES/NAME-VERSION of the packages that hold them.",
-        _of("recorded_rigs", "kept_report"),
+        "recorded_rigs:kept_report",
         ("kept-recordings", "kept-predictions", "kept-verdicts"),
         (click.Option(["--cut"], type=_FOLDER),),
     ),
@@ -195,42 +167,42 @@ CASES = (
         "recordings",
         "Real rigs that others recorded: identified from one run, another one predicted, beside the published values. "
         "FOLDER holds the pieces; --cut writes them there from checkouts of the repositories that hold the recordings.",
-        _of("recorded_rigs"),
+        "recorded_rigs",
         ("recordings", "predictions", "verdicts", "traps"),
         (click.Argument(["folder"], type=_FOLDER), click.Option(["--cut"], type=_FOLDER)),
     ),
     Case(
         "fuzz-link",
         "The C side of the serial link under libFuzzer, with sanitizers (needs clang).",
-        _of("fuzz", "link_report"),
+        "fuzz:link_report",
         ("fuzz-link",),
         (option("--runs", 10_000_000),),
     ),
     Case(
         "fuzz-api",
         "Random calls of the C core's public API, with sanitizers (needs clang).",
-        _of("fuzz", "api_report"),
+        "fuzz:api_report",
         ("fuzz-api",),
         (option("--calls", 10_000_000), option("--seed", 1)),
     ),
     Case(
         "codec",
         "Corrupted frames of every length against both decoders of the serial link.",
-        _of("codec"),
+        "codec",
         ("codec",),
         (option("--frames", 1_000_000),),
     ),
     Case(
         "log",
         "Frames a minute of processor time through `pvid log`, losses, memory.",
-        _of("field", "log_report"),
+        "field:log_report",
         ("log",),
         (option("--frames", 200_000, least=1000),),
     ),
     Case(
         "liar",
         "A board that sends false data, against `pvid log` and all readers of its logs; then mutants of frames.",
-        _of("liar"),
+        "liar",
         ("liar",),
         (
             option("--mutants", 100_000, "Frames changed at random."),
@@ -240,7 +212,7 @@ CASES = (
     Case(
         "attack",
         "Mutated rig files, runs and command lines: how many defects they find.",
-        _of("attack"),
+        "attack",
         ("attack",),
         (
             option("--mutants", 33_400, "Of each kind."),
@@ -264,7 +236,7 @@ CASES = (
     Case(
         "field-log",
         "An hour in the field, shortened in time: the board killed twice, its line closed once, all verified.",
-        _of("field"),
+        "field",
         ("field-log",),
         (
             _TARGET,
@@ -275,7 +247,7 @@ CASES = (
     Case(
         "year",
         "A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page.",
-        _of("year"),
+        "year",
         ("year-f32", "year-q31"),
         (
             _TARGET,
@@ -287,7 +259,7 @@ CASES = (
     Case(
         "long",
         "The long forms of the tests: 40 000 ticks, every build and board, mutants (an hour).",
-        _of("long"),
+        "long",
         ("long",),
         (click.Option(["--only"], metavar="ROOM", multiple=True, help="A folder of tests/; may be given again."),),
     ),
@@ -295,7 +267,7 @@ CASES = (
         "random-models",
         "Random rigs the whole road: check, identify in float64 and in C, refine, build, compile, equal bits; and "
         "descriptions without sense, of which each is a report or one sentence.",
-        _of("random_models"),
+        "random_models",
         ("random-models", "compile-times", "senseless-models"),
         (
             option("--count", 2000, "Of rigs."),
@@ -332,6 +304,16 @@ for _case in CASES:
 
 
 # ---- parts of pages that are written from what is measured ----
+
+
+@bench.command(name="claims")
+@DATA
+def bench_claims(data: Path | None) -> int:
+    """Which command holds which claim: its tables, the pages that quote them, the test of its short form."""
+    from bench import claims
+
+    put_results(data, "claims", claims.HEADER, claims.rows(CASES))
+    return DONE
 
 
 @bench.command(name="demo")

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from bench.board_weak import Answer, FixedBoard, FloatBoard, board_of
+from bench.case import columns
 from bench.mechanisms import design_of, size_of, start_of
 from pvid.configuration.weak import neglected_part
 from pvid.models.drive import Drive, Scaled
@@ -31,18 +32,9 @@ Float = npt.NDArray[np.float64]
 SEEDS = 20
 RARE = 1e-3  # probability below which chance is no explanation
 BEYOND = 3.0  # standard errors
-HEADER = (
-    *(
-        "mechanism",
-        "case",
-        "published",
-        "RMS % of each parameter",
-        "in 3 s.e. %",
-        "alarm",
-        "wrong, no alarm",
-        "else held",
-    ),
-    *("fixed point: published", "fixed point: wrong, no alarm", "by chance", "fault"),
+HEADER = columns(
+    "mechanism | case | published | RMS % of each parameter | in 3 s.e. % | alarm | wrong, no alarm | else held |"
+    " fixed point: published | fixed point: wrong, no alarm | by chance | fault"
 )
 
 

@@ -15,7 +15,7 @@ from math import exp, tanh
 import numpy as np
 import numpy.typing as npt
 
-from bench.case import Advance, Report, counts
+from bench.case import Advance, Report, columns, counts
 from bench.plants import NOTHING, PLANTS, SAMPLES, Axis, Plant, States, Values
 from pvid.base.errors import PvidError
 from pvid.identification.road import identified
@@ -26,18 +26,9 @@ from pvid.rig.run import Recording
 Float = npt.NDArray[np.float64]
 Law = Callable[[States, float], float]  # of states and time [s]
 
-HEADER = (
-    "plant",
-    "effect",
-    "runs",
-    "error %",
-    "in s.e. without the model's part",
-    "in s.e.",
-    "wrong without a warning",
-    "warnings",
-    "named rightly",
-    "named wrongly",
-    "error with the named terms %",
+HEADER = columns(
+    "plant | effect | runs | error % | in s.e. without the model's part | in s.e. | wrong without a warning | "
+    "warnings | named rightly | named wrongly | error with the named terms %"
 )
 
 WRONG_SE, WRONG = (4.0, 0.02)  # an answer is wrong beyond so many standard errors and this part of the value
@@ -650,17 +641,10 @@ def summary(rows: Sequence[Row]) -> tuple[tuple[str, int], ...]:
     )
 
 
-CAMPAIGN = (
-    "plant",
-    "recordings with effects",
-    "wrong without a warning",
-    "with a parameter more than 2 % off",
-    "of these have a name",
-    "named rightly",
-    "named wrongly",
-    "recordings without an effect",
-    "of these with a warning",
-    "covered by 2 s.e. %",
+CAMPAIGN = columns(
+    "plant | recordings with effects | wrong without a warning | with a parameter more than 2 % off | of these "
+    "have a name | named rightly | named wrongly | recordings without an effect | of these with a warning | "
+    "covered by 2 s.e. %"
 )
 
 

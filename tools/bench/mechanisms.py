@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bench.case import Advance, Table
+from bench.case import Advance, Report, Table, chosen, columns
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
@@ -30,33 +30,13 @@ CLOSE = 0.05  # "within 5 %"
 WRONG = 4.0  # standard errors: an error above is not covered
 
 ACCURACY = ("mechanism", "parameter", "bound %", "RMS %", "RMS / bound", "mean error %", "RMS / s.e.", "in 2 s.e. %")
-SUMMARY = (
-    "mechanism",
-    "friction",
-    "chi2",
-    "within 5 % after s: median",
-    "longest",
-    "warnings",
-    "s to identify",
+SUMMARY = columns("mechanism | friction | chi2 | within 5 % after s: median | longest | warnings | s to identify")
+TWO_WINDOWS = columns(
+    "mechanism | friction | parameter | runs beyond 5 % | RMS error there % | s.e. of two windows % | bound of "
+    "two windows %"
 )
-TWO_WINDOWS = (
-    "mechanism",
-    "friction",
-    "parameter",
-    "runs beyond 5 %",
-    "RMS error there %",
-    "s.e. of two windows %",
-    "bound of two windows %",
-)
-IMPERFECT = (
-    "mechanism",
-    "imperfection",
-    "largest error: of",
-    "%",
-    "in s.e.",
-    "chi2",
-    "warnings",
-    "wrong without a warning",
+IMPERFECT = columns(
+    "mechanism | imperfection | largest error: of | % | in s.e. | chi2 | warnings | wrong without a warning"
 )
 
 
@@ -336,24 +316,25 @@ def number_of_cases(name: str) -> int:
     return sum(case.of(simulation) is not None for case in CASES)
 
 
-def tables(names: Sequence[str], seeds: int, advance: Advance) -> list[Table]:
-    """Of the page; imperfect rigs have a fourth of the runs."""
+def report(mechanism: Collection[str], number: int, advance: Advance) -> Report:
+    """See bench.case; imperfect rigs have a fourth of the runs."""
     accuracy, sharp, summary, early, cases = [], [], [], [], []
-    for name in names:
-        soft = smooth(name, seeds, advance)
+    for name in chosen(mechanism):
+        soft = smooth(name, number, advance)
         accuracy += list(accuracy_rows(name, soft))
-        chosen = identified(name, seeds, PERFECT, advance=advance)
+        sharply = identified(name, number, PERFECT, advance=advance)
         rubs = bool(soft.simulation.rig.friction_width)
-        sharp += list(accuracy_rows(name, chosen))
+        sharp += list(accuracy_rows(name, sharply))
         own, free = ("soft, of known width", "sharp; design chosen") if rubs else ("none", "none; design chosen")
-        summary += [summary_row(name, own, soft), summary_row(name, free, chosen)]
-        early += [*two_window_rows(name, own, soft), *two_window_rows(name, free, chosen)]
-        if seeds >= 4:
-            cases += list(imperfection_rows(name, seeds // 4, advance))
-    return [
+        summary += [summary_row(name, own, soft), summary_row(name, free, sharply)]
+        early += [*two_window_rows(name, own, soft), *two_window_rows(name, free, sharply)]
+        if number >= 4:
+            cases += list(imperfection_rows(name, number // 4, advance))
+    made: list[Table] = [
         ("mechanisms", ACCURACY, accuracy),
         ("mechanisms-chosen", ACCURACY, sharp),
         ("mechanisms-summary", SUMMARY, summary),
         ("mechanisms-two-windows", TWO_WINDOWS, early),
         ("imperfections", IMPERFECT, cases),
     ]
+    return Report(made)

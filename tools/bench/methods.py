@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench import strong_savitzky_golay, weak_sindy
+from bench.case import columns
 from bench.mechanisms import design_of, size_of, start_of
 from bench.output_error import output_error
 from bench.replay import Replay
@@ -25,15 +26,9 @@ from pvid.sim.simulated_run import PERFECT, RigSimulation, simulation_of
 Float = npt.NDArray[np.float64]
 
 SEEDS = 3
-HEADER = (
-    "mechanism",
-    "method",
-    "start off",
-    "runs with every parameter within 5 %",
-    "median parameter %",
-    "worst parameter %",
-    "of",
-    "s a run",
+HEADER = columns(
+    "mechanism | method | start off | runs with every parameter within 5 % | median parameter % | worst parameter"
+    " % | of | s a run"
 )
 CLOSE = 0.05
 _SUBSTEPS = 2  # of output error's simulation in a sample

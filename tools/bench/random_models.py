@@ -27,7 +27,7 @@ import numpy as np
 from sympy.core.cache import clear_cache
 
 from bench import senseless_models
-from bench.case import Advance, Report, Table
+from bench.case import Advance, Report, Table, columns
 from bench.random_motion import RandomRun, random_run
 from bench.random_rigs import random_rig
 from pvid.base.errors import PvidError
@@ -39,7 +39,7 @@ from pvid.codegen.weak_sizes import refuse_too_many_unknowns
 from pvid.compare.bits import Comparison
 from pvid.compare.weak import compare_recording
 from pvid.configuration.refine import refine_design
-from pvid.configuration.weak import config_for_recording
+from pvid.configuration.weak import config_for_recording, config_to_identify
 from pvid.configuration.weak_q31 import weak_q31_for_recording
 from pvid.core.host_compiler import compiled_once, host_compiler
 from pvid.core.sources import INCLUDES, build_folder, core_sources
@@ -51,28 +51,22 @@ from pvid.identification.advice import advised
 from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis, Value
 from pvid.identification.core import identify_in_c
-from pvid.identification.core_refined import compare_both, refined_in_c
+from pvid.identification.core_refined import BothStages, compare_refined, refined_in_c
 from pvid.identification.refinement.adoption import refined_answer
+from pvid.model.compiled import CompiledModel
 from pvid.model.identifiability import identifiable
 from pvid.model.report import check_report
 from pvid.models import mechanisms
+from pvid.oracle.weak.choice import Scored
 from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording
 from pvid.settings.enums import Core
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 
-HEADER = (
-    "kind",
-    "rigs",
-    "failures",
-    "good",
-    "warning",
-    "not identified",
-    "refused",
-    "median error [s.e.]",
-    "largest of good",
-    "second stage in C",
-    "fixed point",
+HEADER = columns(
+    "kind | rigs | failures | good | warning | not identified | refused | median error [s.e.] | largest of good |"
+    " second stage in C | fixed point"
 )
 COMPILE_HEADER = ("mechanism", "theta", "unknowns", "compiled in [s]", "judged in [s]")
 
@@ -250,10 +244,7 @@ def _in_c(road: Road, run: RandomRun, answer: Analysis) -> None:
             if found.identified:
                 _judge(road, run, found.values, good=found.verdict.status == "good", stage=core)
             if core == "f32":
-                first, second = compare_both(model, recording, ranking=ranking)
-                _equal(road, "f32", first)
-                if isinstance(second, Comparison):
-                    _equal(road, "second stage", second)
+                _equal_in_f32(road, model, recording, ranking)
                 with road.stage("second stage"):
                     both = refined_in_c(found)
                     json.dumps(both.as_json(), allow_nan=False)
@@ -261,6 +252,16 @@ def _in_c(road: Road, run: RandomRun, answer: Analysis) -> None:
                         _judge(road, run, both.values, good=found.verdict.status == "good", stage="second stage")
             else:
                 _equal(road, core, compare_recording(model, recording, core, ranking=ranking))
+
+
+def _equal_in_f32(road: Road, model: CompiledModel, recording: Recording, ranking: Sequence[Scored]) -> None:
+    """Both stages after every tick, whose hash contains the first one; that alone where there is no second one."""
+    try:
+        stages = BothStages.of(model, recording, config_to_identify(model, recording, ranking))
+    except PvidError:
+        _equal(road, "f32", compare_recording(model, recording, "f32", ranking=ranking))
+    else:
+        _equal(road, "both stages", compare_refined(stages))
 
 
 def _equal(road: Road, stage: str, found: Comparison) -> None:

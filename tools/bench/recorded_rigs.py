@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from bench.case import Advance, Report
-from bench.kept_recordings import KEPT
-from bench.recordings import MECHANISMS, PIECES, SOURCES, Source, write_source
+from bench.case import Advance, Report, columns
+from bench.recordings import KEPT, MECHANISMS, PIECES, SOURCES, Source, write_source
 from bench.replay import Match, Replay
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.design import WeakDesign
@@ -25,13 +24,9 @@ from pvid.sim.plant import SHARP, Friction
 Float = npt.NDArray[np.float64]
 
 HEADER = ("rig", "parameter", "identified on one run", "on the other", "published", "the two apart")
-PREDICTIONS = (
-    "rig",
-    "sensor",
-    "R^2 of the second run from the first",
-    "of the first from the second",
-    "of the second, published",
-    "RMS error of the second",
+PREDICTIONS = columns(
+    "rig | sensor | R^2 of the second run from the first | of the first from the second | of the second, "
+    "published | RMS error of the second"
 )
 VERDICTS = ("rig", "alarms of the first run", "of the second", "beyond 4 s.e. between the runs")
 

@@ -1,18 +1,22 @@
 """Real hardware, recorded by other laboratories: where the recordings are, and how a short piece of each is cut.
 
-The recordings of SOURCES are not in this repository; `./tools/pvid bench recordings FOLDER --cut CHECKOUTS` cuts two
-pieces of each from checkouts CHECKOUTS/OWNER/NAME of the public repositories: one to identify from, one to predict.
-Pieces from packages are kept here, see bench.kept_recordings. The mechanisms are those of tests/data/recordings.
+The rigs are those of tests/data/recordings/sources.toml, with their mechanisms. The recordings of SOURCES are not in
+this repository; `./tools/pvid bench recordings FOLDER --cut CHECKOUTS` cuts two pieces of each from checkouts
+CHECKOUTS/OWNER/NAME of the public repositories: one to identify from, one to predict. Pieces of KEPT are here;
+`./tools/pvid bench kept-recordings --cut ARCHIVES` cuts them anew from the unpacked archives ARCHIVES/NAME-VERSION.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.io import loadmat
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
@@ -23,6 +27,7 @@ from pvid.rig.columns import Channel, Columns
 from pvid.rig.run import Recording, read_recording, write_recording
 
 Float = npt.NDArray[np.float64]
+Names = Sequence[str]
 
 MECHANISMS = Path(__file__).resolve().parents[2] / "tests" / "data" / "recordings"
 PIECES = ("identify", "predict")
@@ -55,60 +60,39 @@ class Measured(Channel):
 
 
 @dataclass(frozen=True)
-class Repository:
-    """A public repository, whose recordings are not copied into this one.
+class Origin:
+    """A public repository, whose recordings are not copied into this one, or the source archive of a Python package, of
+    whose recordings pieces are kept in tests/data/recordings.
 
     Attributes
     ----------
-    name : owner/name
-    commit : that the figures of the docs are from
+    name : owner/name of the repository; of the package, as its registry has it
+    commit : of the repository, that the figures of the docs are from
+    version, licence : of the package, and the path of its licence's text
     """
 
     name: str
-    commit: str
+    commit: str = ""
+    version: str = ""
+    licence: str = ""
 
     @property
     def folder(self) -> str:
-        """Of its checkout."""
-        return self.name
+        """Of its checkout, or of the unpacked archive."""
+        return f"{self.name}-{self.version}" if self.version else self.name
 
     @property
     def request(self) -> str:
         """What a user must do to have it there."""
+        if self.version:
+            return f"unpack the source archive of the Python package {self.name} {self.version} there"
         return f"check out {self.name} at {self.commit} there"
 
     def __str__(self) -> str:
         """For a table of origins."""
+        if self.version:
+            return f"Python package {self.name} {self.version}, source archive"
         return f"{self.name}, commit {self.commit}"
-
-
-@dataclass(frozen=True)
-class Package:
-    """The source archive of a Python package: what is cut from its recordings is kept in tests/data/recordings.
-
-    Attributes
-    ----------
-    name, version : as the package registry has them
-    licence : path of its text
-    """
-
-    name: str
-    version: str
-    licence: str
-
-    @property
-    def folder(self) -> str:
-        """Of the unpacked archive."""
-        return f"{self.name}-{self.version}"
-
-    @property
-    def request(self) -> str:
-        """What a user must do to have it there."""
-        return f"unpack the source archive of the Python package {self.name} {self.version} there"
-
-    def __str__(self) -> str:
-        """For a table of origins."""
-        return f"Python package {self.name} {self.version}, source archive"
 
 
 @dataclass(frozen=True)
@@ -121,7 +105,7 @@ class Source:
     file : of the mechanism
     origin : where the recordings are
     licence : of the origin, with its copyright line
-    read : a file and a part of it -> t [s] and signals of the mechanism in SI, by name
+    read : its format, one of _READERS
     identify, predict : the two pieces
     rate : samples a second of the pieces [Hz]; the recording's own rate unless given
     decimals : digits kept behind the point, by signal; beyond what the sensor resolves
@@ -134,9 +118,9 @@ class Source:
 
     name: str
     file: str
-    origin: Repository | Package
+    origin: Origin
     licence: str
-    read: Callable[[Path, int], Mapping[str, Float]]
+    read: str
     identify: Piece
     predict: Piece
     channels: tuple[Measured, ...]
@@ -170,7 +154,7 @@ class Source:
         path = checkouts / self.origin.folder / piece.path
         if not path.is_file():
             raise PvidError(f"{path} does not exist: {self.origin.request}")
-        table = dict(self.read(path, piece.part))
+        table = dict(_READERS[self.read](path, piece.part, [one.name for one in self.channels]))
         t = table.pop("t")
         later = np.append(True, np.diff(t) > 0)
         used = later & (t >= piece.start) & (t < piece.end)
@@ -198,7 +182,7 @@ def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
             write_recording(paths[-1], source.cut(checkouts, piece), source.channels)
     paths.append(place / "PROVENANCE.md")
     write_whole(paths[-1], provenance(source).encode(), freely=True)
-    if isinstance(source.origin, Package):
+    if source.origin.version:
         paths.append(place / "LICENSE.txt")
         write_whole(paths[-1], (checkouts / source.origin.folder / source.origin.licence).read_bytes(), freely=True)
     return paths
@@ -212,16 +196,19 @@ def provenance(source: Source) -> str:
         for name, piece in source.pieces.items()
     ]
     published = ", ".join(f"{name} = {value:.6g}" for name, value in source.published.items())
+    command, licence = "recordings FOLDER --cut CHECKOUTS", "LICENSE of that repository"
+    if source.origin.version:
+        command, licence = "kept-recordings --cut ARCHIVES", "LICENSE.txt beside this one"
     rate = "the recording's own" if source.rate is None else f"{source.rate:g} Hz"
     return "\n".join(
         [
             f"# {source.name}",
             "",
             f"Recorded by others: {source.origin}.",
-            f"Licence: {source.licence}. {_where_licence(source.origin)}",
+            f"Licence: {source.licence}. Its text is the file {licence}.",
             "",
             f"Columns: t [s], {columns}. Interpolated onto an even clock, rate: {rate}; rounded below the",
-            f"resolution of the sensors. Cut by `{_command(source.origin)}`.",
+            f"resolution of the sensors. Cut by `./tools/pvid bench {command}`.",
             "",
             "| file | of | part | s |",
             "|---|---|---|---|",
@@ -234,19 +221,14 @@ def provenance(source: Source) -> str:
     )
 
 
-def _where_licence(origin: Repository | Package) -> str:
-    if isinstance(origin, Package):
-        return "Its text is the file LICENSE.txt beside this one."
-    return "Its text is the file LICENSE of that repository."
+# ---- formats: a file, a part of it and the names of the signals -> t [s] and signals in SI, by name
 
-
-def _command(origin: Repository | Package) -> str:
-    if isinstance(origin, Package):
-        return "./tools/pvid bench kept-recordings --cut ARCHIVES"
-    return "./tools/pvid bench recordings FOLDER --cut CHECKOUTS"
-
-
-# ---- formats
+_CLOCK = 1000.0  # samples in the unit of time of the motor's model: the clock is not published
+_REST = 4000  # samples before the motor is first switched on
+_SCALE = 1000.0  # of the generator's numbers
+_SWITCHED = 5.0  # the input while the motor is on
+_SWING_MIDDLE = 1.356  # [V] about which the fork's gyroscope swings
+_MEAN = 5  # samples of the lift
 
 
 def _columns(path: Path, names: Mapping[str, str]) -> dict[str, Float]:
@@ -257,183 +239,67 @@ def _columns(path: Path, names: Mapping[str, str]) -> dict[str, Float]:
     return {name: np.asarray(table[:, header.index(column)]) for name, column in names.items()}
 
 
-def _two_links(path: Path, part: int) -> dict[str, Float]:
-    del part
+def _two_links(path: Path, _: int, __: Names) -> dict[str, Float]:
     names = {"q1": "pos_meas1", "q2": "pos_meas2", "t1": "tau_meas1", "t2": "tau_meas2"}
     return _columns(path, {"t": "time", **names})
 
 
-def _one_link(path: Path, part: int) -> dict[str, Float]:
-    del part
+def _one_link(path: Path, _: int, __: Names) -> dict[str, Float]:
     return _columns(path, {"t": "time", "q": "position", "tau": "torque"})
 
 
-def _free_swing(names: tuple[str, ...]) -> Callable[[Path, int], dict[str, Float]]:
+def _free_swing(path: Path, part: int, names: Names) -> dict[str, Float]:
     """A file with pieces of one run: part 0 those of Y_id, part 1 those of Y_vad; angles, then velocities."""
-
-    def read(path: Path, part: int) -> dict[str, Float]:
-        from scipy.io import loadmat
-
-        content = loadmat(path, squeeze_me=True)
-        key = ("id", "vad")[part]
-        t = np.concatenate(list(content[f"Time_{key}"]))
-        motion = np.concatenate([np.asarray(one).T for one in content[f"Y_{key}"]])
-        return {"t": t, **{name: np.ascontiguousarray(motion[:, k]) for k, name in enumerate(names)}}
-
-    return read
+    content, key = loadmat(path, squeeze_me=True), ("id", "vad")[part]
+    motion = np.concatenate([np.asarray(one).T for one in content[f"Y_{key}"]])
+    t = np.concatenate(list(content[f"Time_{key}"]))
+    return {"t": t, **{name: np.ascontiguousarray(motion[:, k]) for k, name in enumerate(names)}}
 
 
-def _random_discharge(path: Path, part: int) -> dict[str, Float]:
+def _random_discharge(path: Path, part: int, _: Names) -> dict[str, Float]:
     """The discharge number `part` of random steps of the current; charge counted from its start [A s]."""
-    from scipy.io import loadmat
-
     run = loadmat(path, squeeze_me=True)["rw_data"][part]
     t, i, v = (np.asarray(run[name], dtype=np.float64) for name in ("t", "I", "V"))
     charge = np.append(0.0, np.cumsum((i[1:] + i[:-1]) / 2 * np.diff(t)))
     return {"t": t, "i": i, "q": charge, "v": v}
 
 
-# ---- sources
-
-_ANGLES = ("q1", "q2")
-_DFKI = "BSD 3-Clause, Copyright (c) {year}, DFKI RIC Underactuated Robotics Lab"
-_DOUBLE = Repository("dfki-ric-underactuated-lab/double_pendulum", "1e8544e67f3da72a51ee52fbbb278e131ce2a43f")
-_SWINGS = Repository("dynamicslab/MultiArm-Pendulum", "e99a7e13fe2adc8fc647321a156b6cb59a48a698")
-_SINGLE = Repository(
-    "dfki-ric-underactuated-lab/torque_limited_simple_pendulum", "ed17ea2d32a35ad944944ca03ef57693e2986732"
-)
-_CELL = Repository(
-    "Silencefrog9305/Digital-Twins-for-Battery-Using-CTA-MTL", "ec0fe7c0e6ceb8576086d3adc8232b7d14616deb"
-)
-_TWO_LINK_CHANNELS = (
-    Measured("q1", "rad", meaning="angle of the upper link"),
-    Measured("q2", "rad", meaning="angle of the lower link to the upper"),
-    Measured("t1", "N*m", meaning="torque of the upper motor"),
-    Measured("t2", "N*m", meaning="torque of the lower motor"),
-)
-_ONE_LINK_CHANNELS = (Measured("q", "rad", meaning="angle"), Measured("tau", "N*m", meaning="torque"))
-_CELL_CHANNELS = (
-    Measured("i", "A", meaning="current"),
-    Measured("q", "A*s", meaning="charge drawn"),
-    Measured("v", "V", meaning="voltage"),
-)
+def _switched_motor(path: Path, _: int, __: Names) -> dict[str, Float]:
+    """The generator's numbers of PATH less their value at rest; the input beside it."""
+    y, u = (np.loadtxt(one, ndmin=1) for one in (path, path.with_name("x_cc.csv")))
+    return {"t": np.arange(len(y)) / _CLOCK, "u": u / _SWITCHED, "y": (y - y[:_REST].mean()) / _SCALE}
 
 
-def _links(
-    m1: float, r1: float, i1: float, m2: float, r2: float, i2: float, l1: float, rotor: float
-) -> dict[str, float]:
-    """Parameters of the mechanism of masses, distances, inertias about the joints and a rotor geared 6 : 1."""
-    return {
-        "J1": i1 + m2 * l1**2 + 36 * rotor,
-        "J2": i2,
-        "Jm": 36 * rotor,
-        "h1": m1 * r1 + m2 * l1,
-        "h2": m2 * r2,
-    }
+def _gyroscope(path: Path, _: int, __: Names) -> dict[str, Float]:
+    content = loadmat(path, squeeze_me=True)
+    v = np.asarray(content["data"], dtype=np.float64)
+    return {"t": np.arange(len(v)) / float(content["ActualRate"]), "v": v - _SWING_MIDDLE}
 
 
-def _double(
-    name: str, design: str, day: str, runs: tuple[int, int], l1: float, published: dict[str, float], at: str
-) -> Source:
-    folder = f"data/experiment_records/{design}/{day}/sys_id"
-    return Source(
-        name=name,
-        file="double_pendulum.py",
-        origin=_DOUBLE,
-        licence=_DFKI.format(year=2022),
-        read=_two_links,
-        identify=Piece(f"{folder}/trajectory_{runs[0]:02d}.csv"),
-        predict=Piece(f"{folder}/trajectory_{runs[1]:02d}.csv"),
-        channels=_TWO_LINK_CHANNELS,
-        rate=500.0,
-        decimals={"t1": 4, "t2": 4},
-        published=published,
-        published_at=f"data/system_identification/identified_parameters/{design}/{at}/model_parameters.yml",
-        knowns={"l1": l1},
-    )
+def _lift(path: Path, _: int, __: Names) -> dict[str, Float]:
+    """Means of five samples of the first joint; the file of the efforts is beside that of the positions."""
+    files = (path, path.with_name("tiago_effort.csv"))
+    positions, efforts = (np.loadtxt(one, delimiter=",", skiprows=1) for one in files)
+    whole = len(positions) // _MEAN * _MEAN
+    columns = {"t": positions[:whole, 0], "q": positions[:whole, 1], "i": efforts[:whole, 1]}
+    return {name: one.reshape(-1, _MEAN).mean(axis=1) for name, one in columns.items()}
 
 
-SOURCES = (
-    _double(
-        "double_pendulum_a",
-        "design_A.0",
-        "20220815",
-        (5, 1),
-        0.3,
-        _links(0.55938, 0.3, 0.0534708, 0.6043459, 0.1837769, 0.0239237, 0.3, 7.6593e-5)
-        | {"b1": 0.001, "c1": 0.093, "b2": 0.001, "c2": 0.078},
-        "model_2.0",
-    ),
-    _double(
-        "double_pendulum_c",
-        "design_C.0",
-        "20220914",
-        (2, 1),
-        0.2,
-        _links(0.6416938, 0.2, 0.0267108, 0.5639360, 0.3212670, 0.0538781, 0.2, 9.9373e-5)
-        | {"b1": 0.001, "c1": 0.093, "b2": 0.001, "c2": 0.078},
-        "model_3.0",
-    ),
-    Source(
-        name="simple_pendulum",
-        file="simple_pendulum.py",
-        origin=_SINGLE,
-        licence=_DFKI.format(year=2021),
-        read=_one_link,
-        identify=Piece("results/control_method_direct_collocation/data_measured.csv"),
-        predict=Piece("results/control_method_ddp/data_measured.csv"),
-        channels=_ONE_LINK_CHANNELS,
-        decimals={"tau": 4},
-        published={"J": 0.139625, "G": 0.6755 * 0.5 * 9.81, "b": 0.1},
-        published_at="data/parameters/sp_parameters_sac.yaml",
-        traps={
-            # a swing-up by small pushes: most of the motion is not the torque's work
-            "attenuation": Piece("results/control_method_energy_shaping/data_measured.csv"),
-            # the torque is that which holds the weight
-            "feedback": Piece("results/control_method_gravity_compensation/data_measured.csv", end=15.0),
-        },
-    ),
-    Source(
-        name="free_pendulum",
-        file="free_pendulum.py",
-        origin=_SWINGS,
-        licence="MIT, Copyright (c) 2022 dynamicslab",
-        read=_free_swing(("q",)),
-        identify=Piece("ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat", part=0),
-        predict=Piece("ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat", part=1),
-        channels=(Measured("q", "rad", meaning="angle from upright"),),
-        # m a g/(m a^2 + I) and k/(m a^2 + I) of the five numbers of the file
-        published={"w2": 64.221, "k": 0.06723, "c": 0.0, "o": 0.0},
-        published_at="ParameterEstimation/SinglePendulum/EstimatedParameters_SinglePendulum.mat",
-    ),
-    Source(
-        name="free_double_pendulum",
-        file="free_double_pendulum.py",
-        origin=_SWINGS,
-        licence="MIT, Copyright (c) 2022 dynamicslab",
-        read=_free_swing(_ANGLES),
-        identify=Piece(
-            "ParameterEstimation/DoublePendulum/DoublePendulumDataForParameterEstimation.mat", end=16.0, part=0
-        ),
-        predict=Piece(
-            "ParameterEstimation/DoublePendulum/DoublePendulumDataForParameterEstimation.mat", 16.0, 26.0, part=0
-        ),
-        channels=tuple(Measured(name, "rad", meaning="angle from upright") for name in _ANGLES),
-        # of the ten numbers of the file, over m2 a2 L1
-        published={"A": 2.035, "B": 1.134, "G1": 120.0, "G2": 56.8, "k1": 0.0854, "k2": 0.0036},
-        published_at="ParameterEstimation/DoublePendulum/EstimatedParameters_DoublePendulum.mat",
-    ),
-    Source(
-        name="cell_dmegc",
-        file="cell_dmegc.py",
-        origin=_CELL,
-        licence="MIT, Copyright (c) 2025 Silencefrog9305",
-        read=_random_discharge,
-        # both to 1.9 A h: a polynomial of the charge must not be extrapolated
-        identify=Piece("Exp25_R1.mat", end=3500.0, part=25),
-        predict=Piece("Exp25_R1.mat", end=2800.0, part=26),
-        channels=_CELL_CHANNELS,
-        rate=0.1,
-        decimals={"i": 4, "q": 3, "v": 4},
-    ),
-)
+_READERS: Mapping[str, Callable[[Path, int, Names], dict[str, Float]]] = {
+    one.__name__[1:]: one
+    for one in (_two_links, _one_link, _free_swing, _random_discharge, _switched_motor, _gyroscope, _lift)
+}
+
+
+def _source(given: Mapping[str, Any]) -> Source:
+    """Of an entry of sources.toml."""
+    made: dict[str, Any] = {**given}
+    made |= {key: Piece(**made[key]) for key in PIECES}
+    made["traps"] = {name: Piece(**piece) for name, piece in made.get("traps", {}).items()}
+    made |= {"origin": Origin(**made["origin"]), "channels": tuple(Measured(**one) for one in made["channels"])}
+    return Source(**made)
+
+
+_ALL = [_source(one) for one in tomllib.loads((MECHANISMS / "sources.toml").read_text(encoding="utf-8"))["rig"]]
+SOURCES = tuple(one for one in _ALL if not one.origin.version)
+KEPT = tuple(one for one in _ALL if one.origin.version)  # pieces are in tests/data/recordings

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 
 _MOST_DECIMALS = 6
+_FIXED = (1e-3, 1e4, 9)  # values without an exponent, and the decimals that they have at most
 _MOST_ZEROS = 4  # that stand in front of the point for digits that are not known
 
 
 def with_error(value: float, error: float) -> tuple[str, str]:
-    """Value and standard error to the error's second digit: 9.50069, 0.0011 is ("9.5007", "0.0011")."""
+    """Value and standard error to the error's second digit: 9.50069, 0.0011 is ("9.5007", "0.0011").
+
+    Values from 0.001 to 9999 have up to nine decimals, others of more than six an exponent.
+    """
     if not (math.isfinite(value) and math.isfinite(error) and error > 0):
         return f"{value:.6g}", f"{error:.2g}"
     decimals = 1 - math.floor(math.log10(error))
-    if decimals > _MOST_DECIMALS or decimals < -_MOST_ZEROS:
+    most = _FIXED[2] if _FIXED[0] <= abs(value) < _FIXED[1] else _MOST_DECIMALS
+    if decimals > most or decimals < -_MOST_ZEROS:
         known = math.floor(math.log10(abs(value))) + decimals if value else 0
         return f"{value:.{min(max(known, 0), 15)}e}", f"{error:.1e}"
     if decimals < 0:
@@ -31,7 +36,6 @@ def percent(part: float) -> str:
 _PREFIXED = {"m", "s", "A", "V", "ohm", "H", "F", "N", "W", "J", "Pa", "Hz"}
 _PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M"}
 _PLAIN = (1.0, 1e4)  # values that need none
-_FIXED = (1e-3, 1e4, 9)  # values without an exponent, and the decimals that they have at most
 
 
 def prefix_of(size: float, unit: str) -> tuple[str, float]:
@@ -46,12 +50,6 @@ def prefix_of(size: float, unit: str) -> tuple[str, float]:
 def with_prefix(value: float, error: float, unit: str) -> tuple[str, str, str, float]:
     """Value and error to the error's second digit, their unit with an SI prefix where the unit takes one, and what a
     number in that unit is multiplied with: 0.0030002, 8e-7, "H" is ("3.00020", "0.00080", "mH", 1e-3).
-
-    Without a prefix 0.05 has up to nine decimals, 0.0005 an exponent.
     """
     unit, scale = prefix_of(abs(value), unit)
-    value, error = value / scale, error / scale
-    if _FIXED[0] <= abs(value) < _FIXED[1] and 10.0 ** -(_FIXED[2] - 1) <= error < 1.0:
-        decimals = 1 - math.floor(math.log10(error))
-        return f"{value:.{decimals}f}", f"{error:.{decimals}f}", unit, scale
-    return *with_error(value, error), unit, scale
+    return *with_error(value / scale, error / scale), unit, scale

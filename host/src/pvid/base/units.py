@@ -64,6 +64,7 @@ _DERIVED: dict[str, tuple[str, int | Fraction]] = {
     "|L": ("m^3", Fraction(1, 1000)),
     "min": ("s", 60),
     "h": ("s", 3600),
+    "d": ("s", 86_400),
     "in": ("m", Fraction(254, 10_000)),
     "ft": ("m", Fraction(3048, 10_000)),
     "kgf": ("N", Fraction(980_665, 100_000)),
@@ -86,6 +87,7 @@ _WORDS = {
     "ns": "nsec nanosecond nanoseconds",
     "min": "mins minute minutes",
     "h": "hr hrs hour hours",
+    "d": "day days",
     "m": "meter meters metre metres",
     "mm": "millimeter millimeters millimetre millimetres",
     "cm": "centimeter centimeters centimetre centimetres",
@@ -119,7 +121,7 @@ _NAME = re.compile(r"[A-Za-z_%]+|1(?!\d)")
 _POWER = re.compile(r"\^?([+-]?\d+)|\^\(([+-]?\d+/[1-9]\d*)\)")
 # Of a signal in an SI unit, what a refusal proposes.
 _USUAL = {
-    "s": ("s", "ms", "us", "ns", "min", "h"),
+    "s": ("s", "ms", "us", "ns", "min", "h", "d"),
     "rad": ("rad", "mrad", "deg", "rev", "turn"),
     "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
     "rad/s^2": ("rad/s^2", "deg/s^2", "rev/s^2"),

@@ -368,12 +368,13 @@ def _is_large(value: Value, part: str) -> bool:
 
 
 def table_of(values: Mapping[str, Value], title: str) -> Table:
-    """Values by name with their standard errors, the parts of these, and the verdict where one is not good."""
+    """Values by name with their standard errors, the parts of these where noise is not most of each, and the verdict
+    where one is not good."""
     large = {"from scale": "se_scale", "from the model": "se_model"}
     large = {name: of for name, of in large.items() if any(_is_large(one, of) for one in values.values())}
     doubted = any(one.word != "good" for one in values.values())
-    names = ("parameter", "estimate", "standard error", "from noise", *large)
-    table = Table(*names, *(["verdict"] if doubted else []), title=title)
+    names = ("parameter", "estimate", "standard error", *(["from noise", *large] if large else []))
+    table = Table(*names, *(["verdict"] if doubted else []), title=title, min_width=len(title))
     for column in table.columns[1 : len(names)]:
         column.justify = "right"
     for name, one in values.items():
@@ -383,7 +384,7 @@ def table_of(values: Mapping[str, Value], title: str) -> Table:
             continue
         estimate, error = with_error(one.value, one.se)
         below = "" if one.below is None else f" (below {one.below:.2g})"
-        parts = [one.se_noise, *(getattr(one, of) or 0.0 for of in large.values())]
+        parts = [one.se_noise, *(getattr(one, of) or 0.0 for of in large.values())] if large else []
         word = [one.word] if doubted else []
         table.add_row(label, estimate + below, error, *(f"{part:.2g}" for part in parts), *word)
     return table

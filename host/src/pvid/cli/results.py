@@ -77,11 +77,6 @@ def put_results(folder: Path | None, name: str, header: Sequence[str], rows: Ite
     write_stderr(f"{folder / name}.csv written")
 
 
-def put_counts(folder: Path | None, name: str, counts: Iterable[tuple[str, int]]) -> None:
-    """The same of one run: what was counted, and the number."""
-    put_results(folder, name, ("what", "number"), ((what, str(number)) for what, number in counts))
-
-
 def _command() -> str:
     """This process's, without the folder of its results."""
     words = sys.argv[1:]

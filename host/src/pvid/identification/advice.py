@@ -20,6 +20,7 @@ from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import neglected, ready
+from pvid.rig.clock import CLOCKS, USUAL_RATES
 from pvid.rig.columns import Columns
 from pvid.rig.mechanism_file import channels_of
 
@@ -35,8 +36,8 @@ _PART_OF_SIGN, _PART_OF_UNIT = 0.3, 1.5
 _FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: a unit is doubted beyond the one, right within the other
 _ALIKE = 1.05  # times the least part that is left
 _EXPLAINS = 0.9  # R^2 of rows that explain a recording
-_TIMES = ("ms", "us")
-_OF_ANALYSIS = 0.3  # of the work that is allowed to a search for a design: that of the search for a mistake
+_DOUBTFUL_RATES = (1e-3, 1e6)  # Hz: beyond these a unit of time is not tried
+_OF_ANALYSIS = 0.25  # of the work that is allowed to a search for a design: that of the search for a mistake
 # By unit: what a column may be in instead.
 _UNITS = {
     "rad": ("deg", "rev"),
@@ -74,8 +75,10 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
     Each signal in turn has the other sign or another usual unit, then all of one unit have that, with the design of the
     answer.
     """
-    if (unit := _unit_of_time(answer)) is not None:
-        return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
+    unit = _unit_of_time(answer)
+    of_time = () if unit is None else (f"t seems to be in {_named(unit)}, not s: --columns t=t:{unit}",)
+    if unit is not None and _unusual(answer, unit) < _unusual(answer):
+        return of_time
     if answer.recording.origins and answer.found.chi2 > _DIFFER and (own := _of_own(answer)) is not None:
         return (own,)
     near = _distance(answer, answer.found.p) < _FAR and not _is_beyond_equations(answer)
@@ -95,7 +98,7 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
     nearest = min((one.distance for one in alike), default=0.0)
     alike = [one for one in alike if one.distance <= _ALIKE * nearest][:2]
     if not alike:
-        return ()
+        return of_time
     other = [f" (or {one.typed.partition('=')[0]}: --columns {one.typed})" for one in alike[1:]]
     return (f"{alike[0].said}: --columns {alike[0].typed}" + "".join(other),)
 
@@ -108,13 +111,27 @@ def _unit_of_time(answer: Analysis) -> str | None:
     if _distance(answer, answer.found.p) < _FAR:
         return None
     design = answer.found.design
-    for unit in _TIMES:
+    low, high = _DOUBTFUL_RATES
+    for unit in sorted(CLOCKS, key=lambda unit: _unusual(answer, unit)):
+        if not low < answer.recording.sample_rate * CLOCKS[unit] < high or work.is_spent():
+            continue
         scale = _scale(answer, "t", unit)
         other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
         one = _score(answer, design=other)
         if one is not None and one.known and _distance(answer, one.p) < _NEAR:
             return unit
     return None
+
+
+def _unusual(answer: Analysis, unit: str = "") -> float:
+    """By which factor the sample rate is outside the usual ones, if the time is in this unit; else as it stands."""
+    rate, (low, high) = answer.recording.sample_rate * CLOCKS.get(unit, 1.0), USUAL_RATES
+    return max(low / rate, rate / high, 1.0)
+
+
+def _named(unit: str) -> str:
+    number, _, ticks = unit.partition("/")
+    return f"ticks of {ticks} Hz" if ticks else number
 
 
 def _distance(answer: Analysis, p: Float) -> float:

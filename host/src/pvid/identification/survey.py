@@ -41,7 +41,7 @@ _EPOCH = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))  # of seconds they are 1.7e9
 _OF_MOTION = 0.99  # share of a signal's power
 _SPECTRUM = 1 << 17  # samples
 _SI = ("rad", "m", "s", "rad/s", "m/s", "V", "A", "N", "N*m", "K", "Hz", "W", "Pa", "kg", "m/s^2", "rad/s^2")
-_CONFLICTING = frozenset("m s a k n v h g c w j t f l in min".split())  # also words of names
+_CONFLICTING = frozenset("m s a k n v h d g c w j t f l in min".split())  # also words of names
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -32,6 +32,9 @@ _CODES, _FEWEST_CODES, _STEADY = 8, 4, 0.05
 # One or two values that no motion reaches: so many spans of eight of ten samples away from them, time and again, not in
 # the long runs of a pulse.
 _SPANS, _MOST_VALUES, _TENTH = 10.0, 2, 0.1
+# Or any values of a sensor in runs of a few: so many spans away, between samples within one, while no other sensor
+# moves by so many times its usual motion from two samples before to two behind, as it would with a true pulse.
+_ALONE, _BESIDE, _MOVED = 3.0, 2, 3.0
 MOST_FAR = 0.05  # of the samples: with more, the recording is refused
 
 
@@ -93,6 +96,24 @@ def _out_of_reach(x: Float) -> Mask:
     return outside if np.median(end - first) <= _RUN else none
 
 
+def _alone(x: Float, others: Sequence[Float]) -> Mask:
+    """Samples of a sensor, of a drive or of what jumps with it, far beyond all that is about them, if nothing else that
+    is measured moves with them."""
+    far = np.zeros(len(x), np.bool_)
+    low, high = np.quantile(x[np.isfinite(x)], [_TENTH, 1 - _TENTH])
+    off = np.maximum(low - x, x - high)
+    first, end = stretches(off > high - low)
+    inner = (end - first <= _RUN) & (first >= _BESIDE) & (end + _BESIDE <= len(x))
+    for one, last in zip(first[inner], end[inner], strict=True):
+        far[one:last] = off[one:last].min() > _ALONE * (high - low)
+    at = np.flatnonzero(far)
+    for other in others if at.size else ():
+        moves = np.ptp(np.lib.stride_tricks.sliding_window_view(other, 2 * _BESIDE + 1), axis=1)
+        if np.nanmedian(moves[at - _BESIDE]) > _MOVED * np.nanmedian(moves):
+            return np.zeros(len(x), np.bool_)
+    return far
+
+
 def _steady(recording: Recording, model: CompiledModel) -> Mask:
     """Samples before which no input moves by much."""
     steady = np.ones(len(recording), np.bool_)
@@ -114,7 +135,7 @@ def _without_far_samples(recording: Recording, signal: Signal, find: Callable[[F
     if not count:
         return x, ""
     values, times = np.unique(x[far], return_counts=True)
-    usual = f"{values[np.argmax(times)]:g} {signal.unit}".rstrip()
+    usual = f"{values[np.argmax(times)] if times.max() > 1 else x[np.argmax(far)]:g} {signal.unit}".rstrip()
     if count > MOST_FAR * np.count_nonzero(there):
         raise PvidError(
             f"{signal.name} is far from the samples about it in {count} of {len(x)} samples, most often {usual}: an "
@@ -128,11 +149,9 @@ def _without_far_samples(recording: Recording, signal: Signal, find: Callable[[F
     )
     filled[~far] = x[~far]
     many = f"{count} samples of {signal.name} are" if count > 1 else f"a sample of {signal.name} is"
-    what = f"{usual} in {times.max()} of them" if count > 1 else usual
-    return (
-        filled,
-        f"{many} far from those about it ({what}, the first at {recording.t[np.argmax(far)]:.6g} s): interpolated",
-    )
+    what = usual + (f" in {times.max()} of them" if times.max() > 1 else "")
+    at = f"the first at {recording.t[np.argmax(far)]:.6g} s"
+    return filled, f"{many} far from those about it ({what}, {at}): interpolated"
 
 
 def without_wild_samples(recording: Recording, model: CompiledModel) -> Recording:
@@ -155,10 +174,13 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     span = max(_SHORTEST, round(_SPAN * recording.sample_rate))
     orders = {one.name: max(order_of(equation, [one.name]) for equation in model.equations) for one in model.signals}
     steady = _steady(recording, model)
+    sensors = [one.name for one in model.signals if one.kind == "sensor"]
     for one in model.signals:
         find: Callable[[Float], Mask] = partial(far_from_median, sd=one.sd)
-        if one.kind != "sensor" or one.driven or not orders[one.name]:
+        if one.kind != "sensor":
             find = _out_of_reach
+        elif one.driven or not orders[one.name]:
+            find = partial(_alone, others=[recording.signals[name] for name in sensors if name != one.name])
         elif orders[one.name] < 2:
             find = partial(_error_codes, sd=one.sd, steady=steady)
         x, note = _without_far_samples(recording, one, find)

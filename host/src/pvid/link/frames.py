@@ -839,11 +839,8 @@ class Decoder:
             yield self._lost("foreign", piece)
             return
         yield from self._gap(schema, sequence)
-        read = self.schemas[schema].get(number)
         try:
-            if read is None:
-                raise PvidError(f"no frame type {number}")
-            message = read(payload)
+            message = self.schemas[schema][number](payload)
         except Exception:  # whatever a reader stumbles over is in the bytes, and they are the line's
             yield self._lost("layout", piece)
             return

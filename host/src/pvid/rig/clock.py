@@ -44,7 +44,9 @@ RATE_TOLERANCE = 1e-4
 # has another unit, or the rig file is another one's.
 RATE_LIMIT = 0.05
 _RATE_RANGE_HZ = (1e-3, 1e9)
-_USUAL_RATES = (20.0, 20_000.0)  # Hz
+USUAL_RATES = (20.0, 20_000.0)  # Hz
+# By unit of a clock, how many are a second; the ticks are those of a watch's quartz.
+CLOCKS = {"ms": 1e3, "us": 1e6, "1/32768": 32_768.0, "ns": 1e9, "min": 1 / 60, "h": 1 / 3600, "d": 1 / 86_400}
 _LONGEST_S = 1e20  # nanoseconds taken for seconds, since 1970, are 2e18
 # Rows on either side of a gap whose mean gives the number of missing ticks: jitter averages out.
 _ROWS_BESIDE_GAP = 20
@@ -411,7 +413,7 @@ def _rate(table: Table, measured: float, error: float, promised: float | None) -
 
 def _cause(name: str, ratio: float, measured: float) -> str:
     """Why t may run at another rate than the rig file promises."""
-    for unit, per_second in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+    for unit, per_second in CLOCKS.items():
         if abs(ratio * per_second - 1) < 2 * RATE_LIMIT:
             return f": t looks like {unit}: use --columns t={name}:{unit}"
     return f": if t is right, use --set sample_rate={_shortest_decimal(measured, 1e-3):g}"
@@ -419,8 +421,8 @@ def _cause(name: str, ratio: float, measured: float) -> str:
 
 def _unit(name: str, rate: float) -> str:
     """What unit t is in, likely, where its rate in seconds [Hz] is impossible."""
-    for unit, per_second in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
-        if _USUAL_RATES[0] <= rate * per_second <= _USUAL_RATES[1]:
+    for unit, per_second in CLOCKS.items():
+        if USUAL_RATES[0] <= rate * per_second <= USUAL_RATES[1]:
             return f": t looks like {unit}: use --columns t={name}:{unit}"
     return " (is t in seconds?)"
 

@@ -13,6 +13,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
@@ -29,6 +30,7 @@ from pvid.rig.size import refuse_beyond
 from pvid.rig.table import Table
 from pvid.rig.text_lines import blocks
 from pvid.rig.times import TimesOfDay, is_time
+from pvid.rig.turned_table import turned
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -70,7 +72,15 @@ def read_csv(path: Path, columns: Columns) -> Table:
 
 def text_table(path: Path, columns: Columns, lines: Callable[[], Iterator[bytes]], line: str = "line") -> Table:
     """Reads a table of what begins to give blocks of lines anew at every call; `line` is what its lines are called."""
-    return _TextTable(path, columns, lines, line).read()
+    try:
+        table = _TextTable(path, columns, lines, line)
+    except PvidError:
+        other = turned(lines)
+        if other is None:
+            raise
+        found = _TextTable(path, columns, other.blocks, "row").read()
+        return replace(found, notes=(f"the table has {other.note}", *found.notes))
+    return table.read()
 
 
 def write_csv(path: Path, named: dict[str, FloatArray]) -> bytes:

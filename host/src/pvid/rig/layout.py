@@ -21,7 +21,7 @@ from pvid.rig.times import is_time
 _NO_DATA = re.compile(r"[ \t]*(?:(?:[#%]|//|sep=).*)?")
 _MARKS = "#%/; \t"  # of a comment
 _GARBAGE = re.compile(r"[^!-~]+")
-_SEPARATORS = (";", "\t", ",", "|", " ")
+SEPARATORS = (";", "\t", ",", "|", " ")
 _SAMPLED = 400  # lines that the separator is found from
 _LABEL = re.compile(r"([A-Za-z_][^\s:=,;]*)\s*[:=]\s*([^\s:=]*)")
 _DATE = r"\d{4}-\d\d-\d\d[T ]"
@@ -139,7 +139,7 @@ def find(lines: Sequence[str], wanted: Sequence[str], positions: Sequence[int] =
     sought = [one for one in wanted if not (stamped and one in ("t", STAMP))]
     found: list[tuple[tuple[bool, float], Layout]] = []
     named = cache(lambda: _named(bare, sought))
-    for separator in _SEPARATORS:
+    for separator in SEPARATORS:
         table = _table(bare, separator, sought, [one - int(stamped) for one in positions], named)
         if table is not None:
             found.append(table)

@@ -14,6 +14,7 @@ from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Jet, order_of
+from pvid.oracle.weak.errors import chi2_of_sensors
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.terms import Act, Candidate
@@ -21,6 +22,7 @@ from pvid.oracle.weak.verdict import Reason
 from pvid.rig.gaps import at_its_ends
 from pvid.sim.motion import motion_of
 
+_MISFIT = 20.0  # chi^2 from which an input is doubted
 _CLIPPED = 2e-3  # of the samples at the limit, from which a sensor clips
 _HELD = 3  # samples at the limit, at least
 _BEYOND = 10.0  # resolutions by which the motion before the limit would have gone beyond it
@@ -54,13 +56,15 @@ def of_samples(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_ra
     for one in model.signals:
         if one.kind == "sensor":
             out += clipped(model, one, samples) + toggling(model, one, samples[one.name])
+        elif chi2_of_sensors(fit) > _MISFIT:
+            out += clipped(model, one, samples)
     return out + far_guesses(model, fit)
 
 
 def explains(reasons: Iterable[Reason], best: Candidate, sample_rate: float) -> bool:
     """Whether samples that clip, or a rate that is too low, are the cause of the best candidate: the motion within a
     sample looks like a delay of a part of it, or like any law, but not like a longer delay."""
-    names = {one.name for one in reasons}
+    names = {one.name for one in reasons if one.alarm}
     late = (
         isinstance(best.kind, Act) and best.kind.measure == "time" and abs(best.number) >= _PART_OF_SAMPLE / sample_rate
     )
@@ -71,7 +75,8 @@ def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) 
     """A sensor stands at its largest or smallest value, reached at speed, while something else moves.
 
     A motion that turns there would come to it slowly. What settles there, as a current after a step of its voltage,
-    does so while every other signal stands too.
+    does so while every other signal stands too. An input may well be limited to that value: of one that comes to it
+    steadily this is a note.
     """
     x = samples[signal.name]
     reach = float(np.nanmax(x) - np.nanmin(x))
@@ -84,6 +89,8 @@ def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) 
             if end - first < _HELD or first < _APPROACH:
                 continue
             speed = abs(limit - x[first - _APPROACH]) / _APPROACH
+            if signal.kind == "input" and np.any(np.diff(x[first - _APPROACH : first]) == 0):
+                continue
             moving = inertial or any(np.ptp(y[first:end]) > _MOVES * float(np.nanmax(y) - np.nanmin(y)) for y in others)
             if moving and speed * (end - first) / 2 > _BEYOND * step:
                 count += int(end - first)
@@ -91,8 +98,14 @@ def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) 
             value = with_unit(limit, signal.unit, 4)
             text = (
                 f"{signal.name} stands at its {side} value, {value}, in {100 * count / len(x):.2g} % of the samples, "
-                "and reaches it at speed: the sensor clips, or the mechanism meets a stop. Keep the motion below it, "
-                "or leave these parts of the run out."
+                "and reaches it at speed: "
+            )
+            if signal.kind == "input":
+                text += f"does what records it clip, or does {signal.name} itself end there?"
+                return [Reason("clipped", text, alarm=False)]
+            text += (
+                "the sensor clips, or the mechanism meets a stop. Keep the motion below it, or leave these parts of "
+                "the run out."
             )
             return [Reason("clipped", text)]
     return []

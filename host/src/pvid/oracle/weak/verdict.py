@@ -62,6 +62,7 @@ ParameterStatus = Literal["identified", "near_zero", "not_identified"]
 
 # Of another parameter: part of its range.
 _UNKNOWN_OF_RANGE = 0.5
+_NEXT_TO_0 = 1e-3  # of its guess: a value and an error of it that mean 0
 
 # Two estimates disagree if they differ by so many standard errors of the difference ...
 _CLASH = 4.0
@@ -201,7 +202,13 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
                 Judged("not_identified", f"{one.name} is at its bound, {side} = {with_unit(bound, one.unit, 4)}")
             )
         elif not se[k] <= limit:
-            out.append(Judged("not_identified", f"the standard error of {one.name} is {with_unit(se[k], one.unit, 2)}"))
+            ran_down = one.positive and max(p, float(se[k])) < _NEXT_TO_0 * one.guess
+            why = (
+                "the search takes {} to 0"
+                if ran_down
+                else "the standard error of {} is " + with_unit(se[k], one.unit, 2)
+            )
+            out.append(Judged("not_identified", why.format(one.name)))
         elif own_scale and se[k] > UNKNOWN * abs(p):
             out.append(_near_zero(one, p, float(se[k])))
         else:
