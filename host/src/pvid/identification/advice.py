@@ -38,6 +38,7 @@ _ALIKE = 1.05  # times the least part that is left
 _EXPLAINS = 0.9  # R^2 of rows that explain a recording
 _DOUBTFUL_RATES = (1e-3, 1e6)  # Hz: beyond these a unit of time is not tried
 _OF_ANALYSIS = 0.25  # of the work that is allowed to a search for a design: that of the search for a mistake
+_OF_TIME = 0.1  # the same for the unit of the time
 # By unit: what a column may be in instead.
 _UNITS = {
     "rad": ("deg", "rev"),
@@ -75,7 +76,8 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
     Each signal in turn has the other sign or another usual unit, then all of one unit have that, with the design of the
     answer.
     """
-    unit = _unit_of_time(answer)
+    with work.limited(_OF_TIME * answer.found.allowance):
+        unit = _unit_of_time(answer)
     of_time = () if unit is None else (f"t seems to be in {_named(unit)}, not s: --columns t=t:{unit}",)
     if unit is not None and _unusual(answer, unit) < _unusual(answer):
         return of_time

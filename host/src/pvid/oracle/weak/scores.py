@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.oracle.weak import work
 from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.errors import clustered_variance
 from pvid.oracle.weak.functions import Float
@@ -33,6 +35,9 @@ _CANCELS = 0.25
 
 # What replaces a signal as a whole has a column of size 1.
 _WHOLE = (0.4, 2.5)
+
+_TOGETHER = 16  # candidates
+_OF_SCORE = 2e-5  # units of work for an entry of a column
 
 
 def between(before: Sequence[Float], after: Sequence[Float], step: float) -> Change:
@@ -87,11 +92,17 @@ class Scores:
         return np.asarray(self._whitened([change])[:, 0])
 
     def _whitened(self, changes: Sequence[Sequence[Float]]) -> Float:
-        out = []
+        out = np.zeros((len(self.residuals), len(changes), self.residuals.shape[1]))
+        first = 0
         for white in self.fit.white:
-            own = np.stack([np.concatenate([one[kind] for kind in white.kinds], axis=1) for one in changes], axis=1)
-            out.append(self._without_nuisances(white, white.whitener.of(own)))
-        return np.concatenate(out, axis=2)
+            raw = [np.concatenate([one[kind] for kind in white.kinds], axis=1) for one in changes]
+            there = [k for k, one in enumerate(raw) if one.any()]
+            end = first + raw[0].shape[1]
+            if there:
+                own = white.whitener.of(np.stack([raw[k] for k in there], axis=1))
+                out[:, there, first:end] = self._without_nuisances(white, own)
+            first = end
+        return out
 
     def _without_nuisances(self, white: WhiteRows, rows: Float) -> Float:
         plans = self.fit.rows.compiled.channels.rows
@@ -100,6 +111,7 @@ class Scores:
         q = np.linalg.qr(self.fit.rows.white_nuisances(white.kinds, white.whitener).transpose(0, 2, 1))[0]
         return np.asarray(rows - (rows @ q) @ q.transpose(0, 2, 1))
 
+    @cached_property
     def _folds(self) -> list[npt.NDArray[np.intp]]:
         """Windows of each part of the run."""
         fold = self.fit.rows.parts(FOLDS)
@@ -107,10 +119,7 @@ class Scores:
 
     def by_parts(self) -> Float:
         """What p moves by when the run's parts are left out one by one: standard error of the jackknife [n_p]."""
-        jj = np.array([_products(self.slopes[own], self.slopes[own]) for own in self._folds()])
-        jr = np.array(
-            [_products(self.slopes[own], self.residuals[own][..., np.newaxis])[:, 0] for own in self._folds()]
-        )
+        jj, jr, _ = self._of_parts
         whole, b = jj.sum(axis=0) + self.prior, jr.sum(axis=0)
         without = np.array(
             [self.unit * (inverse(whole - a, self.tangent) @ (b - c)) for a, c in zip(jj, jr, strict=True)]
@@ -127,16 +136,31 @@ class Scores:
 
     def of(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """With their scores, that of the largest share first."""
-        r, slopes = self.residuals, self.slopes
+        work.spend(_OF_SCORE * self.residuals.size * len(candidates))
+        out = [
+            one
+            for first in range(0, len(candidates), _TOGETHER)
+            for one in self._scored(candidates[first : first + _TOGETHER])
+        ]
+        return sorted(out, key=lambda one: -one.share)
+
+    @cached_property
+    def _of_parts(self) -> tuple[Float, Float, Float]:
+        """Of each part, slopes by slopes, slopes by residuals, and the square of the residuals."""
+        r, slopes, parts = self.residuals, self.slopes, self._folds
+        jj = np.array([_products(slopes[own], slopes[own]) for own in parts])
+        jr = np.array([_products(slopes[own], r[own][..., np.newaxis])[:, 0] for own in parts])
+        return jj, jr, np.array([float(np.sum(r[own] ** 2)) for own in parts])
+
+    def _scored(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Some of them, so few that their columns stay in the processor's cache."""
+        r, slopes, parts = self.residuals, self.slopes, self._folds
+        jj, jr, rr = self._of_parts
         c = np.ascontiguousarray(self.white(candidates).transpose(0, 2, 1))
         known = np.concatenate([one.known for one in self.fit.white], axis=1)
-        parts = self._folds()
-        jj = np.array([_products(slopes[own], slopes[own]) for own in parts])
         jc = np.array([_products(slopes[own], c[own]) for own in parts])
-        jr = np.array([_products(slopes[own], r[own][..., np.newaxis])[:, 0] for own in parts])
         cc = np.array([np.einsum("wkc,wkc->c", c[own], c[own]) for own in parts])
         cr = np.array([np.einsum("wkc,wk->c", c[own], r[own]) for own in parts])
-        rr = np.array([float(np.sum(r[own] ** 2)) for own in parts])
 
         mix, step = self.inverse @ jc.sum(axis=0), self.inverse @ jr.sum(axis=0)
         own = cc.sum(axis=0) - np.einsum("pc,pc->c", jc.sum(axis=0), mix)
@@ -171,7 +195,7 @@ class Scores:
             else:
                 real[place] &= abs(size[place]) < one.most
         certainty = np.where(real, np.abs(size) / np.maximum(error, 1e-300), 0.0)
-        out = [
+        return [
             replace(
                 one,
                 size=float(size[k]),
@@ -183,7 +207,6 @@ class Scores:
             )
             for k, one in enumerate(candidates)
         ]
-        return sorted(out, key=lambda one: -one.share)
 
 
 def _products(a: Float, b: Float) -> Float:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 # Of a search in the designs that are usually chosen, and of a long recording, which shows earlier where it leads: one
 # that fits takes a tenth to a half of them.
-_PASSES, _PASSES_OF_LONG = 500, 250
+_PASSES, _PASSES_OF_LONG = 360, 180
 _OF_A_PASS, _OF_A_STEP = 2.0, 0.15
 _OF_ROWS, _OF_REVERSALS = 1.5e-7, 3.5e-6  # of a product of a column's entries: of all windows, of located reversals
 _FUNCTIONS = 40
