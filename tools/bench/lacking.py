@@ -331,9 +331,7 @@ _SENSORS: tuple[tuple[str, tuple[str, ...], tuple[float, ...], Callable[[Float, 
 
 
 def _sensors_of(plant: Plant) -> Iterator[Effect]:
-    clean = plant.measured(
-        u := plant.driven(np.random.default_rng(0)), plant.motion(u), lambda s, t: NOTHING, lambda s, t: plant.values
-    )
+    clean = plant.measured(*plant.unspoilt, lambda s, t: NOTHING, lambda s, t: plant.values)
     for sensor, x in clean.items():
         size_of = float(np.std(x))
 

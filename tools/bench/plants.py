@@ -109,10 +109,15 @@ class Plant:
         return np.asarray(self.bias + self.amplitude * (0.35 * slow + 0.25 * fast + 0.4 * steps))
 
     @cached_property
+    def unspoilt(self) -> tuple[Float, Float]:
+        """Drive [SAMPLES] and states [SAMPLES, n] of a run without an effect."""
+        u = self.driven(np.random.default_rng(0))
+        return u, self.motion(u)
+
+    @cached_property
     def sizes(self) -> Float:
-        """Root mean square of each state over a run without an effect [n]."""
-        states = self.motion(self.driven(np.random.default_rng(0)))
-        return np.asarray(np.sqrt(np.mean(states**2, axis=0)))
+        """Root mean square of each state over that run [n]."""
+        return np.asarray(np.sqrt(np.mean(self.unspoilt[1] ** 2, axis=0)))
 
     def resolution(self, sensor: str) -> float:
         """Of a sensor."""
