@@ -176,7 +176,7 @@ def prediction_rows(rig: Rig) -> list[tuple[str, ...]]:
     for name, match in forth.items():
         unit = rig.model.signal(name).unit
         of_theirs = "-" if theirs is None else f"{theirs[name].r2:.4f}"
-        cells = (f"{match.r2:.4f}", f"{back[name].r2:.4f}", of_theirs, f"{match.rms:.3g} {unit}")
+        cells = (f"{match.r2:.4f}", f"{back[name].r2:.4f}", of_theirs, f"{match.rms:.3g} {unit}".strip())
         rows.append((rig.source.name, name, *cells))
     return rows
 
