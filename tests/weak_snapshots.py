@@ -57,6 +57,7 @@ _LENGTHS: dict[str, dict[str, Length]] = {
         "range": lambda config, model: model.samples,
         "design.circle": lambda design, model: 5 * design.hop // 2,
         "design.compensator": lambda design, model: model.jets,
+        "design.sign_doubt": lambda design, model: model.signs,
         "design.compensator.weights": lambda filter_, model: filter_.half,
     },
     "q31": {

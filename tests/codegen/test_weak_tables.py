@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -11,13 +13,19 @@ from weak_forms import NAMES, WeakForm, weak_form
 from pvid.base.errors import PvidError
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.weak_library import weak_native
+from pvid.configuration.weak import samples_of, weak_tables
 from pvid.configuration.weak_tables import config_of, design_tables, for_core
 from pvid.model import Integral, Model
+from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.channels import running_integrals
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.reversals import averaged
+from pvid.settings.enums import Reason
 from pvid.settings.weak import NONE, Source
+from pvid.sim.imperfections import Imperfections
+from pvid.sim.simulated_run import simulation_of
 
 Complex = npt.NDArray[np.complex128]
 
@@ -208,6 +216,25 @@ def test_the_nearest_design_of_the_identifier() -> None:
     short = for_core(WeakDesign(1000.0, 0.026, 16))  # 13 steps a half, 11 harmonics
     assert short.hop == 24
     assert for_core(WeakDesign(1000.0, 1.0, 16, reversals="soft", soft=0.1)).reversals == "soft"
+
+
+def test_the_core_drops_the_windows_that_the_oracle_leaves_out() -> None:
+    """Those in which a motor's dry friction is in doubt for too long; with averaged signs all of them count."""
+    compiled = compiled_of("dc_motor")
+    run = simulation_of("dc_motor").run(0, Imperfections(friction="sharp"))
+    decided = WeakDesign(1000.0, 0.208, 16, rate_taps=11, rate_degree=2, reversals="decided")
+    made = weak_tables(compiled, run, decided)
+    config = config_of(made.tables, 1000.0, made.rows.compiled.parameters, run=run)
+    assert config.design.sign_doubt is not None and 0.1 < config.design.sign_doubt[0] < 3.0
+    sizes = made.rows.record.grid.size // config.design.hop - 1
+    left_out = sizes - made.rows.windows
+    record = weak_native(compiled, config.design).identifier_of(config).run_samples(samples_of(config, run))
+    solved = np.isin(record.reason, (Reason.UPDATED, Reason.HELD_UNCERTAIN, Reason.MISFIT, Reason.HELD_NOT_EXCITED))
+    assert left_out > 10
+    assert abs(int(np.sum(record.reason == Reason.HELD_NOT_EXCITED)) - left_out) <= 2  # the first windows' solves
+    assert abs(int(solved.sum()) - sizes) <= 2
+    plain = weak_tables(compiled, run, replace(decided, reversals="averaged"))
+    assert plain.rows.windows == sizes and plain.tables.sign_doubt is None
 
 
 def test_a_design_that_the_identifier_does_not_have_is_refused() -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
-from packages import STUBS, built, run
+from packages import STUBS, built, commissioning_of, run
 
-from pvid.configuration.excitation import designed
-from pvid.configuration.weak import config_for_recording, config_for_simulated_rig, simulated_run_of
+from pvid.configuration.weak import config_for_simulated_rig, simulated_run_of
 from pvid.deploy.of_rig import deployment_f32
 from pvid.deploy.targets import write_package
 from pvid.models.mechanisms import compiled_of
@@ -66,11 +65,7 @@ def commissioning(tmp_path_factory: pytest.TempPathFactory) -> Path:
     compiled = compiled_of("dc_motor")
     rig = MechanismRig.parse(block_of(PAGE, "toml"))
     assert rig.sample_rate is not None
-    excitation = designed(compiled, rig.excitation, rig.sample_rate, samples=("V", "i", "phi"), search=False)
-    recording = excitation.recording
-    config = config_for_recording(compiled, recording)
-    made = deployment_f32(compiled, config, recording.signals, "a test", excitation=excitation)
-    write_package(made, "cmake", folder / "p")
+    write_package(commissioning_of(compiled, rig.excitation, rig.sample_rate)[0], "cmake", folder / "p")
     built(folder / "p", folder / "b")
     run("gcc", "-std=c99", "-O2", *SHIPPED, "-c", STUBS / "rig" / "rig.c", "-o", "rig.o", cwd=folder)
     return folder

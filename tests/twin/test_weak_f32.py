@@ -222,9 +222,11 @@ def random_case(seed: int) -> tuple[WeakRig, WeakConfig, Float32]:
     config = rig.resized(functions=functions, hop=hop, decimation=int(random.integers(1, design.decimation + 1)))
     variance = np.where(random.random(kinds) < 0.5, 0.0, 10.0 ** random.uniform(-12, 3, kinds)).astype(np.float32)
     orders = random.integers(0, 3, kinds).astype(np.uint8)
+    signs = config.design.model.signs
+    doubt = (10.0 ** random.uniform(-3, 1, signs)).astype(np.float32) if random.random() < 0.7 else None
     config = replace(
         config,
-        design=replace(config.design, error_variance=variance, error_order=orders),
+        design=replace(config.design, error_variance=variance, error_order=orders, sign_doubt=doubt),
         iterations=int(random.integers(1, 6)),
         compensation=bool(random.integers(2)),
         gate=GateConfig(float(random.choice([0.0, 3.0])), float(random.choice([0.0, 1.0]))),

@@ -606,6 +606,30 @@ static void a_half_without_motion_drops_both_windows_that_it_is_in(void **state)
     assert_int_equal(self.estimator.counters.held_not_excited - held, 2);
 }
 
+/* Steps at which a sign is in doubt: up to a twentieth of a half, 2 of 48, are those of a reversal. */
+static void a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_in(void **state)
+{
+    (void)state;
+    pvid_weak_design_f32 design;
+    pvid_weak_config_f32 config;
+    const float doubt[1] = {0.125f};
+    for (uint32_t steps = 0u; steps <= 3u; steps++) {
+        start(&design, &config);
+        design.sign_doubt = doubt;
+        assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+        uint32_t dropped = 0u;
+        for (uint32_t tick = 0u; tick < (10u * HOP); tick++) {
+            const bool doubtful = (tick >= (5u * HOP)) && (tick < ((5u * HOP) + steps));
+            const float sign = ((tick % 2u) == 0u) ? 1.0f : -1.0f;
+            const float sample[2] = {sign * (doubtful ? 0.125f : 0.126f), 0.0f};
+            dropped += (self.limits.doubt[0] || self.limits.doubt[1]) ? 1u : 0u;
+            (void)pvid_weak_step_f32(&self, sample);
+        }
+        assert_int_equal(dropped, (steps > (HOP / PVID_WEAK_DOUBT)) ? (2u * HOP) : 0u);
+        assert_int_equal(self.estimator.counters.held_not_excited, (steps > (HOP / PVID_WEAK_DOUBT)) ? 2u : 0u);
+    }
+}
+
 static void outliers_are_rejected_by_the_gate(void **state)
 {
     (void)state;
@@ -691,6 +715,7 @@ static void init_names_what_is_out_of_range(void **state)
     REFUSES(design.circle = NULL, PVID_BAD_DESIGN);
     REFUSES(design.compensator = without_weights, PVID_BAD_DESIGN);
     REFUSES(design.sign_width = negative, PVID_BAD_DESIGN);
+    REFUSES(design.sign_doubt = negative, PVID_BAD_DESIGN);
     REFUSES(design.error_variance = negative, PVID_BAD_DESIGN);
     REFUSES(design.error_order = high, PVID_BAD_DESIGN);
     REFUSES(design.noise = of_no_column, PVID_BAD_DESIGN);
@@ -774,6 +799,7 @@ int main(void)
         cmocka_unit_test(a_frozen_identifier_drops_windows_and_resumes),
         cmocka_unit_test(windows_beyond_a_range_or_without_motion_are_dropped),
         cmocka_unit_test(a_half_without_motion_drops_both_windows_that_it_is_in),
+        cmocka_unit_test(a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_in),
         cmocka_unit_test(outliers_are_rejected_by_the_gate),
         cmocka_unit_test(init_names_what_is_out_of_range),
         cmocka_unit_test(an_object_before_its_init_does_nothing),

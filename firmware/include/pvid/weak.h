@@ -78,6 +78,9 @@ typedef struct {
 
 /* ---- the design: tables for a rig ---- */
 
+/* Steps of half a window for each one in which a sign may be in doubt. */
+#define PVID_WEAK_DOUBT 20u
+
 /* Compensator: gives a jet at a step from the block sums x of its signal (src/weak/weak_front_f32.c); with D = 1 x is
  * the signal. i = 1..half.
  *   even order:  x + sum_i w_i ((x_+i - x) + (x_-i - x)), without the leading x if the order is above 0
@@ -111,7 +114,10 @@ typedef struct {
     const uint8_t *error_order;  /* [kinds] the equation error is the derivative of this order of white noise */
     const float *error_variance; /* [kinds] least variance of that noise at a step, >= 0; residuals raise it */
     const float *sign_width;     /* [signs] of the soft sign tanh(v / width); 0: the mean of sgn over a step */
-    float overlap;               /* variance inflation by the noise that overlapping windows share, >= 1 */
+    const float *sign_doubt; /* [signs] within -sign_doubt..sign_doubt the sign of v is in doubt, >= 0: a window with
+                                a half in which one is for over a PVID_WEAK_DOUBT of the steps is dropped: the
+                                mechanism sticks or creeps; NULL: no check */
+    float overlap;           /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_weak_design_f32;
 
 /* ---- a second stage ---- */

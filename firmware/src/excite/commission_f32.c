@@ -265,6 +265,9 @@ pvid_commission_state pvid_commission_step_f32(pvid_commission_f32 *self, const 
 static void begin_pass(pvid_commission_f32 *self)
 {
     pvid_weak_config_f32 config = *self->config->weak;
+    if (phase_of(self) >= (uint32_t)PVID_COMMISSION_CHECK) { /* errors grow as its motion is smaller, or faster */
+        config.trust.se_max /= self->config->check_scale * self->config->check_scale;
+    }
     if ((self->pass > 0u) || (phase_of(self) >= (uint32_t)PVID_COMMISSION_CHECK)) {
         memcpy(config.estimator.start, self->start, sizeof self->start);
     }

@@ -129,6 +129,7 @@ uint32_t pvid_fingerprint_weak_design_f32(const pvid_weak_design_f32 *design)
     hash = pvid_fingerprint_bytes(hash, design->error_order, model->kinds);
     hash = pvid_fingerprint_floats(hash, design->error_variance, model->kinds);
     hash = pvid_fingerprint_floats(hash, design->sign_width, model->signs);
+    hash = pvid_fingerprint_floats(hash, design->sign_doubt, (design->sign_doubt != NULL) ? model->signs : 0u);
     return pvid_fingerprint_float(hash, design->overlap);
 }
 

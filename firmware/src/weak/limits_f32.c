@@ -69,5 +69,5 @@ bool pvid_weak_limits_beyond_f32(const pvid_weak_limits_f32 *self)
 
 bool pvid_weak_limits_still_f32(const pvid_weak_limits_f32 *self)
 {
-    return self->still[0] || self->still[1];
+    return self->still[0] || self->still[1] || self->doubt[0] || self->doubt[1];
 }

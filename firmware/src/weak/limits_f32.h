@@ -23,7 +23,7 @@ void pvid_weak_limits_half_f32(pvid_weak_limits_f32 *self, size_t samples, size_
 /* Whether a sample of the last two halves was beyond its range. */
 bool pvid_weak_limits_beyond_f32(const pvid_weak_limits_f32 *self);
 
-/* Whether a sample moved too little in one of the last two halves. */
+/* Whether a sample moved too little in one of the last two halves, or a sign was in doubt for too long. */
 bool pvid_weak_limits_still_f32(const pvid_weak_limits_f32 *self);
 
 #endif

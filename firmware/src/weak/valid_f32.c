@@ -194,7 +194,8 @@ static pvid_status tables_are_valid(const pvid_weak_design_f32 *design)
                        ((design->noise != NULL) || (design->n_noise == 0u)) &&
                        ((design->sign_width != NULL) || (design->model->signs == 0u));
     if (!given || !filters_are_valid(design) || !all_within(design->circle, (5u * (size_t)design->hop) / 2u, -1.0f) ||
-        !all_within(design->sign_width, design->model->signs, 0.0f)) {
+        !all_within(design->sign_width, design->model->signs, 0.0f) ||
+        ((design->sign_doubt != NULL) && !all_within(design->sign_doubt, design->model->signs, 0.0f))) {
         return PVID_BAD_DESIGN;
     }
     if (!kinds_are_valid(design)) {

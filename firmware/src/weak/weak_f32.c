@@ -303,6 +303,9 @@ PVID_NOINLINE static pvid_reason form_channels(pvid_weak_f32 *self)
     const uint16_t index = self->sums.index;
     pvid_reason dropped = PVID_ACCUMULATED;
     if (pvid_weak_step_take_f32(&self->history, design, self->dt, index, pvid_weak_sums_place_f32(&self->sums))) {
+        if ((index + 1u) == design->hop) {
+            self->limits.doubt[self->sums.half] = (PVID_WEAK_DOUBT * (uint32_t)self->history.doubts) > design->hop;
+        }
         if (pvid_weak_sums_count_f32(&self->sums, design->hop, self->channels)) {
             dropped = end_half(self);
         }

@@ -91,6 +91,17 @@ static void find_signs(const pvid_weak_history_f32 *self, const pvid_weak_design
     }
 }
 
+/* Counts the step whose arguments are v[1], the half's first one or not, if one of its signs is in doubt. */
+static void count_doubts(pvid_weak_history_f32 *self, const pvid_weak_design_f32 *design, bool first)
+{
+    const size_t signs = PVID_COUNT(PVID_EXACT_SIGNS, design->model->signs);
+    bool doubt = false;
+    for (size_t i = 0; i < signs; i++) {
+        doubt = doubt || (pvid_magnitude_f32(self->v[1][i]) <= design->sign_doubt[i]);
+    }
+    self->doubts = (uint16_t)((first ? 0u : self->doubts) + (doubt ? 1u : 0u));
+}
+
 /* Moves the runs by a step; rate: their derivatives at its end. */
 static void move_runs(pvid_weak_history_f32 *self, size_t runs, float half_dt, const float rate[])
 {
@@ -169,6 +180,9 @@ bool pvid_weak_step_take_f32(pvid_weak_history_f32 *self, const pvid_weak_design
             integrate(self, integrands, dt, &now[model->gains], &next[model->gains]);
             if (index == 0u) {
                 begin_half(self, integrands);
+            }
+            if (design->sign_doubt != NULL) {
+                count_doubts(self, design, index == 0u);
             }
             model->form(now, self->integral, dt * (float)index, channel);
         }

@@ -42,6 +42,7 @@ typedef struct {
     float inputs[2][PVID_MAX_INPUTS]; /* of `values` */
     float rate[PVID_WEAK_RUNS];       /* derivatives of the runs there */
     float v[2][PVID_WEAK_SIGNS];      /* arguments of sgn at that step and the one before it */
+    uint16_t doubts;                  /* steps of the half so far in which a sign is in doubt */
     float run[PVID_WEAK_RUNS];        /* integrals since the start of the run, and what rounding took off */
     float run_low[PVID_WEAK_RUNS];
     float out[2][PVID_WEAK_VALUES];          /* results of `values` at the step before that, and place for
@@ -67,6 +68,7 @@ typedef struct {
     uint16_t beyond;                               /* steps that may yet contain a sample beyond its range */
     bool out[2];                                   /* of each half: contains such a step */
     bool still[2];                                 /* of each half: a sample moved too little */
+    bool doubt[2];                                 /* of each half: a sign was in doubt for too long */
     pvid_weak_spread_f32 spread[PVID_MAX_SAMPLES]; /* of samples with a least deviation */
 } pvid_weak_limits_f32;
 

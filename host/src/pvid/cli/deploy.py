@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pvid.configuration.excitation import Excitation
     from pvid.deploy.deployment import Deployment
     from pvid.model.compiled import CompiledModel
+    from pvid.oracle.weak.design import Reversals
     from pvid.rig.mechanism_file import MechanismRig
     from pvid.settings.enums import Core
     from pvid.settings.refine import RefineConfig
@@ -108,7 +109,8 @@ def _deployment(
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
         if is_integer:
             return deployment_q31(weak_q31_for_recording(compiled, recording, functions), recording.signals, title)
-        config = config_for_recording(compiled, recording, functions)
+        signs: Reversals = "averaged" if run_path is not None else "decided"
+        config = config_for_recording(compiled, recording, functions, reversals=signs)
         refine = _noted(lambda: refine_design(compiled, config, recording.signals))
         return deployment_f32(compiled, config, recording.signals, title, refine, excitation)
     if model not in names_of_shipped():

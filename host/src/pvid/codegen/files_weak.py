@@ -308,6 +308,8 @@ def _design_tables(design: WeakDesign32) -> list[str]:
     ]
     if design.model.signs:
         parts.append(_floats(f"{name}_sign_width", design.sign_width, "0: the mean of the sign over a step"))
+    if design.sign_doubt is not None:
+        parts.append(_floats(f"{name}_sign_doubt", design.sign_doubt, "of slower motion the sign is in doubt"))
     return ["\n\n".join(parts)]
 
 
@@ -326,6 +328,7 @@ def _design_struct(design: WeakDesign32) -> str:
         "error_order": f"{name}_error_order",
         "error_variance": f"{name}_error_variance",
         "sign_width": f"{name}_sign_width" if design.model.signs else "NULL",
+        "sign_doubt": "NULL" if design.sign_doubt is None else f"{name}_sign_doubt",
         "overlap": float_literal(np.float32(design.overlap)),
     }
     return initialised(f"static const pvid_weak_design_f32 {name}_design_f32", fields)

@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.weak.identify import identify
+from pvid.oracle.weak.choice import ranked
+from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.verdict import partner_of
 from pvid.sim.simulated_run import RigSimulation
 
@@ -50,13 +51,29 @@ def predicted(name: str, simulation: RigSimulation) -> Prediction:
         found = identify(model, run, simulation.rig.sample_rate, start=simulation.truth)
     except (PvidError, np.linalg.LinAlgError) as error:
         return Prediction(name, np.full(len(model.unknowns), np.inf), failure=str(error))
-    size = np.array(
-        [abs(p) if one.positive else one.sd for one, p in zip(model.unknowns, simulation.truth, strict=True)]
-    )
-    relative = found.se / size
+    relative = found.se / _sizes(simulation)
     worst = int(np.argmax(relative))
     partner = partner_of(found.fit, worst)
     return Prediction(name, relative, model.p_names[worst], "" if partner is None else model.p_names[partner])
+
+
+def predicted_in_core(simulation: RigSimulation) -> Prediction:
+    """Of one drive, by the best design of those that the weak form in C has for a commissioning."""
+    try:
+        run = simulation.run(0)
+        run.pop("t")
+        sample_rate = simulation.rig.sample_rate
+        found = ranked(ready(simulation.model), run, sample_rate, simulation.truth, reversals="decided")[0]
+    except (PvidError, np.linalg.LinAlgError) as error:
+        return Prediction("", np.full(len(simulation.truth), np.inf), failure=str(error))
+    relative = found.error / _sizes(simulation)
+    return Prediction("", relative, simulation.model.p_names[int(np.argmax(relative))])
+
+
+def _sizes(simulation: RigSimulation) -> Float:
+    """What an error of each parameter is compared with [n_p]."""
+    unknowns = zip(simulation.model.unknowns, simulation.truth, strict=True)
+    return np.array([abs(p) if one.positive else one.sd for one, p in unknowns])
 
 
 def advice(model: CompiledModel, found: list[Prediction]) -> str:

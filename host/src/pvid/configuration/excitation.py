@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
-from pvid.configuration.drives import Prediction, predicted
+from pvid.configuration.drives import Prediction, predicted_in_core
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Jet
 from pvid.models.drive import Drive, Sines
@@ -145,7 +145,7 @@ def designed(
         if progress is not None:
             progress(count)
         fitting = within.scaled(tones)
-        found = predicted("", within.simulation(fitting))
+        found = predicted_in_core(within.simulation(fitting))
         return (np.inf if found.failure else _score(found)), fitting, found
 
     tones, found = _by_rule(within), None
@@ -365,14 +365,16 @@ def _guards(
     responses: Mapping[tuple[str, str], tuple[float, float]],
     samples: Sequence[str],
 ) -> tuple[Guard, ...]:
-    """Of each limited signal: its rate first, itself last, which then has the last word."""
+    """Of each limited signal, in the order of the limits: rates first, then values, of which the last one then has the
+    last word."""
     limit = within.limits[drive]["limit"]
     reversal_s = 2.0 * limit / within.slew(drive) + _TICKS_AHEAD / within.sample_rate
     rates, values = [], []
-    for signal in within.compiled.signals:
-        keys = within.limits.get(signal.name, {})
-        if not keys or signal in within.of_drive or signal.name not in samples:
+    signals = {one.name: one for one in within.compiled.signals if one not in within.of_drive and one.name in samples}
+    for name, keys in within.limits.items():
+        if name not in signals:
             continue
+        signal = signals[name]
         response, brake = responses[drive, signal.name]
         smoothing = within.smoothing_s(signal)
         push = 1.0 if response else 0.0

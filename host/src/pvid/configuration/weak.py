@@ -14,7 +14,7 @@ from pvid.configuration.weak_tables import LONGEST_HOP, config_of, design_tables
 from pvid.model.compiled import CompiledModel
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import MODEL_ERROR, Scored, ranked, ranked_for_core, score_of
-from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.design import Reversals, WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.identify import neglected, ready
@@ -87,7 +87,11 @@ def weak_tables(compiled: CompiledModel, run: Run, design: WeakDesign, p: Float 
 
 
 def config_for_recording(
-    compiled: CompiledModel, recording: Recording, functions: int | None = None, ranking: Sequence[Scored] = ()
+    compiled: CompiledModel,
+    recording: Recording,
+    functions: int | None = None,
+    ranking: Sequence[Scored] = (),
+    reversals: Reversals = "averaged",
 ) -> WeakConfig:
     """Settings for the rig that made a recording; the estimate starts at what the recording shows.
 
@@ -97,9 +101,9 @@ def config_for_recording(
     Parameters
     ----------
     functions : K; None: chosen
-    ranking : as of design_for_recording
+    ranking, reversals : as of design_for_recording
     """
-    design, p, known = design_and_p(compiled, recording, functions, ranking)
+    design, p, known = design_and_p(compiled, recording, functions, ranking, reversals)
     config = weak_config(compiled, recording.signals, design, p, start_there=known)
     return with_neglected(config, neglected_part(compiled, recording.signals))
 
@@ -115,10 +119,14 @@ def neglected_part(compiled: CompiledModel, run: Run) -> float:
 
 
 def design_and_p(
-    compiled: CompiledModel, recording: Recording, functions: int | None = None, ranking: Sequence[Scored] = ()
+    compiled: CompiledModel,
+    recording: Recording,
+    functions: int | None = None,
+    ranking: Sequence[Scored] = (),
+    reversals: Reversals = "averaged",
 ) -> tuple[WeakDesign, Float, bool]:
     """The design that is chosen for a recording, the parameters that it was chosen at [n_p], whether to start there."""
-    best = design_for_recording(ready(compiled), recording.signals, recording.sample_rate, ranking)
+    best = design_for_recording(ready(compiled), recording.signals, recording.sample_rate, ranking, reversals)
     return _with(best.design, functions), best.p, best.known
 
 
@@ -130,7 +138,13 @@ def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: S
     return replace(config, trust=replace(config.trust, se_max=UNKNOWN, neglected=0.0))
 
 
-def design_for_recording(model: Compiled, run: Run, sample_rate: float, ranking: Sequence[Scored] = ()) -> Scored:
+def design_for_recording(
+    model: Compiled,
+    run: Run,
+    sample_rate: float,
+    ranking: Sequence[Scored] = (),
+    reversals: Reversals = "averaged",
+) -> Scored:
     """The design of the identifier with the least predicted errors, then a cheaper one that is nearly as good.
 
     A model with corners keeps its sample rate: filters before decimation blur them (measured: 0.2 % of a motor's L).
@@ -138,8 +152,9 @@ def design_for_recording(model: Compiled, run: Run, sample_rate: float, ranking:
     Parameters
     ----------
     ranking : of the analysis of the same run in float64, from the guesses on; used where the identifier's is the same
+    reversals : "averaged", or "decided": for a commissioning, whose bursts are made so that enough windows remain
     """
-    tried = ranked_for_core(model, ranking) or ranked(model, run, sample_rate, reversals="averaged")
+    tried = ranked_for_core(model, ranking) or ranked(model, run, sample_rate, reversals=reversals)
     best = tried[0]
 
     def scored(designs: Iterable[WeakDesign]) -> list[Scored]:

@@ -41,13 +41,13 @@ def for_core(design: WeakDesign) -> WeakDesign:
     """The nearest design that the core has: half windows of whole blocks, block sums before a decimation, kinds of
     rows one by one, signs averaged.
 
-    A soft sign stays one. The core does not locate reversals.
+    A soft sign stays one, and a decided one. The core does not locate reversals.
     """
     block = _STEPS_OF_A_BLOCK
     least = -(-2 * (design.highest + 1) // block) * block
     hop = max(round(design.hop / block) * block, least)
     found = replace(design, window_s=2 * hop * design.dt, joint=False, comb=design.decimation > 1)
-    return found if design.reversals == "soft" else replace(found, reversals="averaged")
+    return replace(found, reversals="averaged") if design.reversals == "located" else found
 
 
 def design_tables(
@@ -79,6 +79,9 @@ def design_tables(
         error_variance=_as_float32([one.variance for one in found], "variance of the equations' own error"),
         sign_width=np.full(model.signs, design.soft if design.reversals == "soft" else 0.0, np.float32),
         overlap=float(np.float32(overlap_of(rows, p, found))),
+        sign_doubt=_as_float32([one.limit for one in rows.record.signs])
+        if design.reversals == "decided" and rows.record.signs
+        else None,
     )
 
 

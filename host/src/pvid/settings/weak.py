@@ -248,6 +248,7 @@ class WeakDesign32:
     error_variance : least one of that noise at a step [kinds]; residuals raise it
     sign_width : of the soft sign [signs]; 0: the mean of sgn over a step
     overlap : variance inflation by the noise that overlapping windows share
+    sign_doubt : a sign whose argument is not larger is in doubt [signs]; None: no check
     """
 
     model: WeakModel
@@ -263,6 +264,7 @@ class WeakDesign32:
     error_variance: Float32
     sign_width: Float32
     overlap: float
+    sign_doubt: Float32 | None = None
 
     @property
     def n_noise(self) -> int:

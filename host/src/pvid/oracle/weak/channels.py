@@ -317,6 +317,8 @@ class Channels:
                 while len(self._positions) > _KEPT:
                     del self._positions[next(iter(self._positions))]
             raw, blur = self._positions[key]
+            if design.reversals == "decided":
+                return reversals.decided(v, sd * per_sensor, blur)
             if (*key, piece) not in self._located:
                 self._located[*key, piece] = reversals.located(v, sd * per_sensor, blur, piece, raw)
                 while len(self._located) > _KEPT:
@@ -327,6 +329,8 @@ class Channels:
             if jet.order == 1:
                 slope = self.function([one])(*[grid.jets.get(x, 0.0) for x in self.plain])[0]
                 variance += float(np.mean(np.square(slope))) * (self.model.signal(jet.of).sd * per_sensor) ** 2
+        if design.reversals == "decided":
+            return reversals.decided(v, variance**0.5, np.zeros(v.shape))
         return reversals.located(v, variance**0.5, np.zeros(v.shape), piece)
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,7 @@ from pvid.oracle.weak import work
 from pvid.oracle.weak.assessment import ALMOST_0, Assessed
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import blur_of, rates_of_drives, shift_of
-from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.design import Reversals, WeakDesign
 from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.functions import Float
@@ -211,14 +210,15 @@ def ranked(
     sample_rate: float,
     start: Float | None = None,
     equation_error: bool = True,
-    reversals: Literal["located", "averaged"] = "located",
+    reversals: Reversals = "located",
 ) -> list[Scored]:
     """All designs tried, the best first.
 
     Parameters
     ----------
     equation_error : as in `chosen`
-    reversals : how signs are summed; "averaged": of the weak form in C, which whitens the kinds of rows one by one
+    reversals : how signs are summed; "averaged" and "decided": of the weak form in C, which whitens the kinds of rows
+        one by one
     """
     found = _ranked(model, run, sample_rate, start, equation_error, reversals, (_FEWEST_WINDOWS, _SHORT_RUN))
     # A logarithm that ran down may have lost its way in windows that are too short.
@@ -234,7 +234,7 @@ def _ranked(
     sample_rate: float,
     start: Float | None,
     equation_error: bool,
-    reversals: Literal["located", "averaged"],
+    reversals: Reversals,
     at_least: Sequence[int],
 ) -> list[Scored]:
     """The same with windows of which the run has at least so many; fewer only where those lead nowhere."""

@@ -15,6 +15,10 @@ from pvid.oracle.weak.functions import Float, TestFunctions
 _BAND = 1.2  # highest frequency of the motion over that of the test functions
 
 
+Reversals = Literal["located", "averaged", "decided", "soft"]
+DOUBT = 20  # PVID_WEAK_DOUBT
+
+
 @dataclass(frozen=True)
 class WeakDesign:
     """Design of a weak form.
@@ -30,7 +34,9 @@ class WeakDesign:
     rate_taps, rate_degree : of the polynomial that gives the derivatives; 0 taps: those of the values
     reversals
         how sgn(v) is summed: "located" finds when v changes sign and gives the samples around it the weights of the
-        exact integral; "averaged" takes the mean of sgn over a step, v linear there; "soft" is tanh(v / soft)
+        exact integral; "averaged" takes the mean of sgn over a step, v linear there; "decided" likewise, without the
+        windows in which a sign is in doubt in more than a part 1 / DOUBT of the steps of a half; "soft" is
+        tanh(v / soft)
     soft : width of the soft sign [unit of the velocity]
     joint : whiten all row kinds together; noise that they share then counts once
     comb
@@ -47,7 +53,7 @@ class WeakDesign:
     degree: int = 6
     rate_taps: int = 21
     rate_degree: int = 3
-    reversals: Literal["located", "averaged", "soft"] = "located"
+    reversals: Reversals = "located"
     soft: float = 0.0
     joint: bool = False
     comb: bool = False

@@ -8,7 +8,7 @@ around it get the values with which the sum equals the integral of sgn(v) g(t) f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +36,7 @@ class Signs:
     reversals : how many of the times are such
     stuck : steps at which the sign stays in doubt for longer than a piece [n]
     slopes : d values / d v of a soft sign, for the noise of v [n]
+    limit : of |v|, up to which an averaged sign is in doubt, "decided" ones alone
     """
 
     values: Float
@@ -44,6 +45,7 @@ class Signs:
     reversals: int
     stuck: npt.NDArray[np.bool_]
     slopes: Float
+    limit: float = 0.0
 
 
 def joined(signs: Sequence[Signs], sizes: Sequence[int]) -> Signs:
@@ -59,6 +61,7 @@ def joined(signs: Sequence[Signs], sizes: Sequence[int]) -> Signs:
         sum(one.reversals for one in signs),
         np.concatenate([one.stuck[:size] for one, size in zip(signs, sizes, strict=True)]),
         np.concatenate([one.slopes[:size] for one, size in zip(signs, sizes, strict=True)]),
+        max(one.limit for one in signs),
     )
 
 
@@ -73,6 +76,12 @@ def averaged(v: Float) -> Signs:
     none = np.zeros(0)
     values = np.clip(2 * v / (np.abs(np.gradient(v)) + 1e-300), -1, 1)
     return Signs(values, none, none, 0, np.zeros(v.shape, bool), np.zeros(v.shape))
+
+
+def decided(v: Float, sd_v: float, blur: Float) -> Signs:
+    """The same, with the steps at which the sign is in doubt: `stuck`."""
+    limit = _NOISES * sd_v + float(blur.max(initial=0.0))
+    return replace(averaged(v), stuck=np.abs(v) <= limit, limit=limit)
 
 
 def correction(f: Float) -> Float:

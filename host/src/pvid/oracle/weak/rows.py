@@ -16,7 +16,7 @@ from pvid.model.corners import with_corners
 from pvid.model.signals import Integral, Jet
 from pvid.model.together import in_columns
 from pvid.oracle.weak.channels import Channels, Record
-from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.design import DOUBT, WeakDesign
 from pvid.oracle.weak.front import grid_of, longest_of_each, samples_of, segments_of, with_jumps
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.noise import NoiseFilters, NoiseModel, ReversalNoise
@@ -124,6 +124,14 @@ class WhiteRows:
         return np.asarray(self.regressors.transpose(0, 2, 1) @ own)
 
 
+def _decided(record: Record, windows: int) -> npt.NDArray[np.bool_]:
+    """Of each window, whether no sign of friction is in doubt for too long [windows]."""
+    hop = record.grid.design.hop
+    doubt = np.any([one.stuck for one in record.signs], axis=0)
+    halves = doubt[: (windows + 1) * hop].reshape(windows + 1, hop).sum(axis=1) * DOUBT <= hop
+    return np.asarray(halves[:-1] & halves[1:])
+
+
 def record_of(
     compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign, times: Mapping[Jet, float] | None = None
 ) -> Record:
@@ -180,6 +188,8 @@ class WeakRows:
         columns = record.columns(self.functions)
         whole = np.all([np.isfinite(one).all(axis=(1, 2)) for one in columns], axis=0)
         whole[record.grid.across] = False
+        if record.grid.design.reversals == "decided" and record.signs:
+            whole &= _decided(record, len(whole))
         if not whole.any():
             raise PvidError("no window of the run is whole: every one has a missing sample")
         self.numbers = np.flatnonzero(whole)
