@@ -41,7 +41,6 @@ NOT_EXECUTED = (
     (r"^\./tools/pvid bench\b", "takes minutes to hours; tests/bench executes its short form"),
     (r"^\./tools/pvid log /dev/ttyACM0 \w+\.csv", "needs a board; tests/log/test_text_table.py has one that prints"),
     (r"^\./tools/pvid demo", "tests/cli/test_cli.py and test_demo_run.py execute it"),
-    (r"--rig commission\.toml", "searches an excitation; tests/deploy/test_examples.py has its package"),
     (r"^\./tools/pvid watch", "runs until Ctrl-C; tests/fleet/test_batch.py"),
     (r"^\./tools/pvid sizes", "builds every image; tests/board/test_targets.py measures some of them"),
     (r"^\./tools/(test|release)\b", "executes the tests themselves; tests/tools/test_release.py executes parts of it"),

@@ -110,13 +110,16 @@ def test_every_block_of_a_page_is_executed(
     if any(block.kind in ("commands", "python", "c") for block in blocks):
         shutil.copytree(files, folder, symlinks=True)
     names: dict[str, object] = {}
-    printed = ""
+    printed = rig = ""
     for place, block in enumerate(blocks):
         full = place + 1 < len(blocks) and blocks[place + 1].kind == "output"
         match block.kind:
             case "commands":
                 printed = ""
                 for line in pages.commands_of(block):
+                    for name in re.findall(r"--rig (\S+)", line):  # what the page shows above it
+                        if rig and not (folder / name).exists():
+                            (folder / name).write_text(rig, encoding="utf-8")
                     if pages.reason_not_to_execute(line) is None:
                         done = run_once(line, folder, full, known)
                         assert done.code == 0, f"{block}: {line}: {done.text}"
@@ -131,6 +134,7 @@ def test_every_block_of_a_page_is_executed(
                 compile_c(block, folder)
             case "toml":
                 MechanismRig.parse(block.text)
+                rig = block.text
             case "output":
                 missing = list(pages.differences(block.text, printed))
                 assert missing == [], f"{block}: tools/pages.py --update {page}\nprinted:\n{printed}"
