@@ -141,6 +141,7 @@ def test_a_plate_without_limits_of_its_sensor_is_commissioned(tmp_path: Path) ->
     assert one.largest("P") <= 40.0
 
 
+@pytest.mark.slow
 def test_motors_that_stick_at_reversals_are_commissioned(tmp_path: Path) -> None:
     """Of such, 17 of 60 were refused while windows in which the motor sticks or creeps counted."""
     made = Commissioning(compiled_of("dc_motor"), MOTOR, 1000.0, tmp_path)
@@ -151,6 +152,7 @@ def test_motors_that_stick_at_reversals_are_commissioned(tmp_path: Path) -> None
         assert one.largest("V") <= 12.0 and one.largest("i") < 10.0
 
 
+@pytest.mark.slow
 def test_a_cart_with_a_pendulum_is_commissioned_within_its_rail(tmp_path: Path) -> None:
     made = Commissioning(compiled_of("cart_pendulum"), CART, 500.0, tmp_path, search=True)
     one = made.of(OTHER_CART)
@@ -179,6 +181,7 @@ speed = 400
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "burst", "substeps"), [(2000, 2.0, 20), (20000, 0.4, 2)], ids=["2 kHz", "20 kHz"])
 def test_the_example_commissions_a_motor_on_an_emulated_stm32(
     rate: int, burst: float, substeps: int, tmp_path: Path

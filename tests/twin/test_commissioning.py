@@ -240,6 +240,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Package:
     return Package(tmp_path_factory.mktemp("plate"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scale", "fault", "aborted", "verdict"),
     [
