@@ -190,6 +190,38 @@ def test_a_constraint_of_something_else_is_refused() -> None:
             model.constraint(one)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_p_stays_finite_within_its_bounds_and_on_any_constraints(seed: int) -> None:
+    """Planes and quadrics, some of them met nowhere, and rows of all sizes: g is within 1e-4 of a large step."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 6))
+    m = int(rng.integers(1, n))
+    q, line, at_0 = rng.normal(size=(m, n, n)) * (seed % 3 > 0), rng.normal(size=(m, n)), rng.normal(size=m)
+    start, sd = rng.normal(size=n), 10.0 ** rng.uniform(-2, 2, n)
+    lower, upper = start - sd * rng.uniform(0.1, 20, n), start + sd * rng.uniform(0.1, 20, n)
+
+    def g(p: Float) -> Float:
+        return np.asarray(np.einsum("mij,i,j->m", q, p, p) + line @ p + at_0)
+
+    try:
+        core = pvid.Estimator(
+            lambda p: p, lambda p: np.eye(n), start=start, start_sd=sd, row_sd=0.1, lower=lower, upper=upper,
+            positive=[False] * n, rate=10.0, constraints=g,
+        )  # fmt: skip
+    except PvidError:
+        return
+    rows = rng.normal(size=(40, n))
+    rows[rng.integers(40, size=4)] *= 1e6
+    rows[3, 0], y = np.nan, rows @ rng.normal(size=n) + rng.normal(size=40)
+    for one, right in zip(rows, y, strict=True):
+        core.step(one, right)
+        p = np.array([core._state.p[k] for k in range(n)])
+        assert np.isfinite(p).all() and (p >= np.float32(lower)).all() and (p <= np.float32(upper)).all()
+        slopes = np.einsum("mij,j->mi", q + q.transpose(0, 2, 1), p) + line
+        assert np.sum(np.abs(g(p)) / np.max(np.abs(slopes) * sd, axis=1)) < 1.1e-4
+    assert np.isfinite(core.estimate.covariance).all()
+
+
 @pytest.mark.parametrize("constraints", [lambda p: p[0] ** 2 + 1, lambda p: [p[0] - 1, p[0] - 2]])
 def test_the_core_refuses_a_start_that_no_step_brings_to_the_constraints(constraints: object) -> None:
     with pytest.raises(PvidError, match="do these contradict each other"):

@@ -62,8 +62,10 @@ struct pvid_model_f32 {
     void (*constraints)(const float p[], float g[]);
 #endif
 #if PVID_MAX_DRIFTS > 0
-    uint8_t n_drifts; /* 0..PVID_MAX_DRIFTS; without forgetting along them all parameters are constant */
-    float drift_s;    /* time constant of what the rows tell along a drift [s], at least 4 groups */
+    uint8_t n_drifts;       /* 0..PVID_MAX_DRIFTS; without forgetting along them all parameters are constant */
+    float drift_s;          /* time constant of what the rows tell along a drift [s], at least 4 groups */
+    const float *anchor_sd; /* [n_p] of a parameter in no row, which drifts and is a theta: standard deviation of its
+                               start; else 0. NULL: there is none */
     /* d[n_drifts][n_p] = directions dp/dt at p, of any length; NULL without drifts */
     void (*drifts)(const float p[], float d[]);
 #endif

@@ -68,12 +68,31 @@ static bool drifts_are_valid(const pvid_estimator_config_f32 *config)
 #endif
 }
 
+#if PVID_MAX_DRIFTS > 0
+/* What is known of the start of parameters in no row, as if of a row. */
+PVID_COLD static void anchor(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+{
+    const pvid_model_f32 *model = config->model;
+    for (size_t k = 0; (model->anchor_sd != NULL) && (k < model->n_c); k++) {
+        const float sd = model->anchor_sd[model->c_column[k]];
+        if (sd > 0.0f) {
+            const float ratio = config->row_sd / sd;
+            pvid_block block;
+            pvid_information_block_f32(model, model->c_row[k], &block);
+            const size_t place = pvid_pattern_diagonal_f32(block.n, (size_t)model->c_row[k] - block.first);
+            self->information.low[block.moment + place] = ratio * ratio;
+        }
+    }
+}
+#endif
+
 /* The share that a drift leaves. */
 PVID_COLD static void prepare_drifts(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
 {
 #if PVID_MAX_DRIFTS > 0
     if (config->model->n_drifts > 0u) {
         self->settings.drift_keep = pvid_settings_decay_f32(1.0f / (config->model->drift_s * config->update_rate_hz));
+        anchor(self, config);
     }
 #else
     (void)self;

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from pvid.codegen import describe
 from pvid.codegen.c_functions import fixed_function, float_function, scaled_function
-from pvid.codegen.c_text import UNCONTRACTED, banner, c_comment, for_cpp, guarded
+from pvid.codegen.c_text import UNCONTRACTED, banner, c_comment, for_cpp, guarded, number
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import Function, ModelFunctions
 from pvid.codegen.generated import GeneratedModel
@@ -18,6 +18,7 @@ SIZES = {
     "theta": ("P", "THETA"),
     "jacobian": ("P", "C"),
     "constraints": ("P", "CONSTRAINED"),
+    "drifts": ("P", "DRIFTING"),
 }
 
 
@@ -26,6 +27,7 @@ MEANING = {
     "channels": "From the inputs of one instant: the channels.",
     "theta": "From p: theta.",
     "jacobian": "From p: the non-zeros of d theta / d p by columns, in the order of c_row and c_column.",
+    "drifts": "From p: the directions in which it drifts.",
     "constraints": "From p: each constraint, which is 0, and its derivatives by p.",
 }
 
@@ -55,6 +57,8 @@ def _sizes(functions: ModelFunctions, command: str) -> str:
         counts["INTEGRANDS"] = len(functions.integrands.labels)
     if functions.constraints.labels:
         counts["CONSTRAINED"] = len(functions.constraints.labels)
+    if functions.drifts.labels:
+        counts["DRIFTING"] = len(functions.drifts.labels)
     about = [
         f"{name}_sizes.h - how many parameters, coefficients and channels {name} has.",
         "",
@@ -110,7 +114,7 @@ def _source(functions: ModelFunctions, command: str) -> str:
         UNCONTRACTED,
         includes_of(f"{name}.h", functions.functions),
         *(float_function(_signature(functions, one), one.program) for one in functions.functions),
-        model_struct(functions, f"{name}_theta_f32", f"{name}_jacobian_f32", f"{name}_constraints_f32"),
+        model_struct(functions, {one.name: f"{name}_{one.name}_f32" for one in functions.functions}),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -127,15 +131,24 @@ def includes_of(header: str, functions: Sequence[Function], standard: Sequence[s
     return "\n\n".join("\n".join(group) for group in groups)
 
 
-def model_struct(functions: ModelFunctions, theta: str, jacobian: str, constraints: str) -> str:
-    """The pattern and NAME_model_f32, with these functions."""
-    tied = len(functions.model.constraints)
+def model_struct(functions: ModelFunctions, named: Mapping[str, str]) -> str:
+    """The pattern and NAME_model_f32, with these functions by name."""
+    model = functions.model
+    anchors = ", ".join(number(model.anchors.get(one, 0.0)) for one in model.p)
+    tied = [f"    .n_constraints = {len(model.constraints)},", f"    .constraints = {named.get('constraints')},"]
+    moving = [
+        f"    .n_drifts = {len(model.drifts)},",
+        f"    .drift_s = {number(model.drift_s)},",
+        "    .anchor_sd = anchor_sd,",
+        f"    .drifts = {named.get('drifts')},",
+    ]
     name, upper = functions.name, functions.name.upper()
     positive = sum(1 << k for k, one in enumerate(functions.model.unknowns) if one.positive)
     several = len(functions.kinds) > 1
     ends = ", ".join(map(str, functions.kind_end))
     return "\n".join(
         [
+            *([f"static const float anchor_sd[{upper}_P] = {{{anchors}}};"] if model.drifts else []),
             *([f"static const uint8_t kind_end[{upper}_KINDS] = {{{ends}}};"] if several else []),
             f"static const uint8_t c_row[{upper}_C] = {{{', '.join(map(str, functions.c_row))}}};",
             f"static const uint8_t c_column[{upper}_C] = {{{', '.join(map(str, functions.c_column))}}};",
@@ -150,9 +163,10 @@ def model_struct(functions: ModelFunctions, theta: str, jacobian: str, constrain
             *(["    .kind_end = kind_end,"] if several else []),
             "    .c_row = c_row,",
             "    .c_column = c_column,",
-            f"    .theta = {theta},",
-            f"    .jacobian = {jacobian},",
-            *([f"    .n_constraints = {tied},", f"    .constraints = {constraints},"] if tied else []),
+            f"    .theta = {named['theta']},",
+            f"    .jacobian = {named['jacobian']},",
+            *(tied if model.constraints else []),
+            *(moving if model.drifts else []),
             "};",
         ]
     )

@@ -137,7 +137,7 @@ def source(made: WeakFunctions, model: WeakModel, command: str) -> str:
         includes_of(f"{name}_weak.h", made.with_results, ("stddef.h",)),
         *(float_function(_signature(one), one.program) for one in made.with_results),
         _form(model),
-        model_struct(own, "theta", "jacobian", "constraints").replace("\nconst ", "\nstatic const ", 1),
+        model_struct(own, {one.name: one.name for one in made.with_results}).replace("\nconst ", "\nstatic const ", 1),
         *_tables(model, upper),
         _struct(model, name, upper),
     ]

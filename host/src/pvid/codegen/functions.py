@@ -112,6 +112,7 @@ class ModelFunctions:
     inputs : of channels and integrands
     channels, integrands, theta, jacobian : the functions
     constraints : each and its slopes by p; without labels where the model has none
+    drifts : all directions; likewise
     c_row, c_column : of each non-zero of C, by columns
     terms : of all columns, by kind and column
     kinds : of rows
@@ -125,6 +126,7 @@ class ModelFunctions:
     theta: Function
     jacobian: Function
     constraints: Function
+    drifts: Function
     c_row: tuple[int, ...]
     c_column: tuple[int, ...]
     terms: tuple[Term, ...]
@@ -133,7 +135,7 @@ class ModelFunctions:
     @property
     def functions(self) -> tuple[Function, ...]:
         """Those that have results."""
-        of_p = (self.theta, self.jacobian, self.constraints)
+        of_p = (self.theta, self.jacobian, self.constraints, self.drifts)
         return tuple(one for one in (self.integrands, self.channels, *of_p) if one.labels)
 
     @cached_property
@@ -195,6 +197,7 @@ def functions_of(
     p_names = identifiers(model.p_names)
     c_row, c_column, c = _jacobian(model, theta)
     tied = [with_values(model, one) for one in model.constraints]
+    moving = tuple(with_values(model, one) for direction in model.drifts for one in direction)
     g = tuple(value for one in tied for value in (one, *(sp.diff(one, symbol) for symbol in model.p)))
 
     def function(
@@ -216,6 +219,7 @@ def functions_of(
             c,
             [f"d theta[{i}] / d {model.p_names[j]}" for i, j in zip(c_row, c_column, strict=True)],
         ),
+        drifts=function("drifts", model.p, p_names, moving, [str(one) for one in moving]),
         constraints=function("constraints", model.p, p_names, g, [str(one) for one in g]),
         c_row=c_row,
         c_column=c_column,

@@ -38,6 +38,7 @@ from pvid.settings.weak import (
 )
 
 _ONE = sp.Integer(1)
+_OF_ROWS = ("integrands", "channels")
 _HIGHEST_FOLD = 2
 
 
@@ -82,8 +83,7 @@ class WeakFunctions:
     @property
     def with_results(self) -> tuple[Function, ...]:
         """The functions that have results."""
-        of_p = (self.functions.theta, self.functions.jacobian, self.functions.constraints)
-        own = (self.prepare, self.values, *of_p)
+        own = (self.prepare, self.values, *(one for one in self.functions.functions if one.name not in _OF_ROWS))
         return tuple(one for one in own if one.labels)
 
     @property
@@ -149,6 +149,7 @@ def theta_model(functions: ModelFunctions) -> ThetaModel:
         c_column=functions.c_column,
         kind_end=functions.kind_end,
         constraints=len(functions.model.constraints),
+        drifts=len(functions.model.drifts),
     )
 
 

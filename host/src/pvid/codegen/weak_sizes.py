@@ -15,6 +15,7 @@ _MEANING = {
     "PVID_MAX_P": "unknowns",
     "PVID_MAX_MOMENTS": "products of coefficients",
     "PVID_MAX_CONSTRAINTS": "constraints",
+    "PVID_MAX_DRIFTS": "drifts",
     "PVID_MAX_THETA_Q31": "coefficients",
     "PVID_MAX_MOMENTS_Q31": "products of coefficients",
     "PVID_MAX_C_Q31": "derivatives of coefficients by unknowns",
@@ -90,6 +91,8 @@ def sizes_of_model(model: WeakModel) -> dict[str, int]:
     }
     if model.model.constraints:
         sizes["PVID_MAX_CONSTRAINTS"] = model.model.constraints
+    if model.model.drifts:
+        sizes["PVID_MAX_DRIFTS"] = model.model.drifts
     return _checked(model.name, sizes)
 
 

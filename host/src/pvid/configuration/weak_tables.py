@@ -154,6 +154,8 @@ def config_of(
     # The prior of the oracle, in units of p.
     unit = parameters.unit(p)
     start_sd = np.abs(unit) / np.sqrt(parameters.prior(p))
+    anchored = [one in parameters.model.anchors for one in parameters.model.p]
+    start_sd = np.where(anchored, parameters.sd, start_sd)  # the size of a step: what is known is model.h's
     following = parameters.model.following
     hop_s = design.hop * design.decimation / sample_rate
     return WeakConfig(

@@ -157,6 +157,12 @@ class Row:
     known: Part
     nuisances: tuple[Part, ...] = ()
 
+    def with_empty(self, other: Row) -> Row:
+        """With the theta of another row that multiply nothing."""
+        empty = [one for one, part in zip(other.theta, other.regressors, strict=True) if not part]
+        regressors = (*self.regressors, *({} for _ in empty))
+        return replace(self, theta=(*self.theta, *empty), regressors=regressors) if empty else self
+
     @property
     def top(self) -> int:
         """Highest order of derivative that a test function takes."""
@@ -281,6 +287,9 @@ class CompiledModel:
     together : of several recordings with own parameters (pvid.model.together): p has one for each recording, which the
         rows and equations contain as one symbol; None: p is what they contain
     constraints : expressions = 0 in p and known constants
+    drifts : directions in which alone p changes in time, each [n_p], in p and known constants
+    drift_s : time constant of what the rows tell along them [s]
+    anchors : unknowns of drifts that are in no equation -> standard deviation of their start, all that is known of them
     """
 
     name: str
@@ -298,6 +307,9 @@ class CompiledModel:
     clock_sd: float = 5e-5  # of a quartz, its temperature and ageing included
     together: Together | None = None
     constraints: tuple[sp.Expr, ...] = ()
+    drifts: tuple[tuple[sp.Expr, ...], ...] = ()
+    drift_s: float = 0.0
+    anchors: Mapping[sp.Symbol, float] = field(default_factory=dict)
 
     @cached_property
     def alone(self) -> CompiledModel:
@@ -318,11 +330,12 @@ class CompiledModel:
         )
 
     def refuse_constraints(self, what: str) -> None:
-        """PvidError where there are any, by what keeps none."""
-        if self.constraints:
+        """PvidError where there are any, or drifts, by what keeps none."""
+        if self.constraints or self.drifts:
+            kind = "constraints between" if self.constraints else "a drift of"
             raise PvidError(
-                f"{self.name} has constraints between its unknowns, which {what} does not keep: the weak form in "
-                "float64 and float32 does"
+                f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in float64 and "
+                "float32 does"
             )
 
     @property

@@ -180,7 +180,7 @@ def with_corners(model: CompiledModel) -> tuple[CompiledModel, dict[str, OfInput
     for row in model.rows:
         parts = parts_of(row)
         whole = merged(parts, *(_added(parts, *one) for one in added_to))
-        rows.append(factor(row.name, whole, model.alone.p, row.nuisances))
+        rows.append(factor(row.name, whole, model.alone.p, row.nuisances).with_empty(row))
     named = {str(one.jet): one for one in made}
     signals = [Signal(one.jet, model.signal(one.name).unit, "input") for one in named.values()]
     return replace(model, rows=tuple(rows), signals=(*model.signals, *signals)), named

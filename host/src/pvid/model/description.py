@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import sympy as sp
 
-from pvid.model.compiled import CompiledModel, Extra, Known, Output, Refinement, Signal, Unknown
+from pvid.model.compiled import CompiledModel, Extra, Known, Output, Refinement, Row, Signal, Unknown
 from pvid.model.compiler import rows_of
 from pvid.model.eliminate import Equation
 from pvid.model.normal_form import rational
@@ -47,6 +47,8 @@ class Model:
         self.defined: dict[Jet, sp.Expr] = {}
         self.equations: list[Equation] = []
         self.constraints: list[sp.Expr] = []
+        self.drifts: list[dict[sp.Symbol, sp.Expr]] = []
+        self.drift_s = 0.0
         self._dimensions: dict[str, Dimension] = {}
         self._coordinates: list[Jet] = []
         self._extras: list[Extra] = []
@@ -268,6 +270,35 @@ class Model:
         self._agree(whole, title)
         self.constraints.append(whole)
 
+    def drift(self, rates: Mapping[sp.Symbol, sp.Expr], memory_s: float) -> None:
+        """A direction in which alone unknowns change in time, as R and k with the heat of a winding.
+
+        Parameters
+        ----------
+        rates
+            unknown -> its change by one unit of what drifts, in unknowns and known constants: {R: alpha*R, k: -beta*k}.
+            An unknown in no equation may be among them, as the temperature's rise: it begins at its guess, within sd.
+        memory_s : time constant of what the rows tell along it [s], as short as the noise allows; one for all drifts
+        """
+        title = f"drift {len(self.drifts) + 1}"
+        own = {one.symbol: one for one in self.unknowns}
+        values = {symbol: sp.sympify(rate) for symbol, rate in rates.items()}
+        units = set()
+        for symbol, rate in values.items():
+            if symbol not in own:
+                raise self._refused(f"{title}: {symbol} is no unknown")
+            self._declared(rate)
+            if jets(rate):
+                raise self._refused(f"{title}: the rate of {symbol} contains a signal")
+            found = dimension_of(rate, self._dimensions) or NUMBER
+            units.add(str(found * self._unit(own[symbol].unit).power(sp.Integer(-1))) if rate != 0 else "")
+        if len(units - {""}) != 1:
+            raise self._refused(f"{title}: its rates, over the units of their unknowns, must be alike, and not all 0")
+        if not 0 < memory_s < math.inf or self.drifts and memory_s != self.drift_s:
+            raise self._refused(f"{title}: memory_s must be a positive time, the same for all drifts")
+        self.drifts.append(values)
+        self.drift_s = float(memory_s)
+
     def add(self, text: str, guess: float = 0.0, sd: float = 1.0) -> None:
         """Adds a term with one new unknown, or changes a signal by it.
 
@@ -443,19 +474,30 @@ class Model:
         rows = rows_of(self.equations, hidden, self.unknowns, rates, by_parts)
         used = {symbol for row in rows for theta in row.theta for symbol in theta.free_symbols}
         used |= {symbol for one in self.constraints for symbol in one.free_symbols}
+        anchored = {one for drift in self.drifts for one in drift if one not in used}
+        for drift in self.drifts:  # a coefficient of nothing, which has what is known of the start, where others drift
+            alone = tuple(one for one in drift if one in anchored)
+            empty = Row("", alone, tuple({} for _ in alone), {})
+            rows = [
+                row if {one for theta in row.theta for one in theta.free_symbols}.isdisjoint(drift)
+                else row.with_empty(empty)
+                for row in rows
+            ]  # fmt: skip
         for one in self.unknowns:
-            if one.symbol not in used:
+            if one.symbol not in used and one.symbol not in anchored:
                 raise ModelError(
                     f"no row contains the unknown {one.name}, so that it cannot be identified: declare it as known"
                 )
+        unknowns = [self._ranged(one) if one.symbol in anchored else one for one in self.unknowns]
         plain = {jet: value for jet, value in self.defined.items() if jet not in integrals}
+        anchors = {one.symbol: one.sd for one in self.unknowns if one.symbol in anchored}
         simulated = [_inserted(one.expression, plain) for one in self.equations]
         simulated += [jet.d() - rates[jet.of] for jet in integrals]
         return CompiledModel(
             name or re.sub(r"\W+", "_", self.title.lower()).strip("_"),
             self.title,
             tuple(self.signals),
-            tuple(self.unknowns),
+            tuple(unknowns),
             tuple(self.knowns),
             tuple(self.outputs),
             tuple(rows),
@@ -464,7 +506,20 @@ class Model:
             (*self.hidden, *integrals),
             replace(self._refinement, extras=tuple(self._extras), shapes=dict(self._shapes)),
             constraints=tuple(self.constraints),
+            drifts=tuple(tuple(one.get(p.symbol, sp.Integer(0)) for p in self.unknowns) for one in self.drifts),
+            drift_s=self.drift_s,
+            anchors=anchors,
         )
+
+    @staticmethod
+    def _ranged(one: Unknown) -> Unknown:
+        """With the half of its range as the size of a large step."""
+        low, high = one.bounds
+        if one.positive or not math.isfinite(high - low):
+            raise ModelError(
+                f"{one.name} drifts and is in no equation: give positive=False and its range, low and high"
+            )
+        return replace(one, sd=(high - low) / 2)
 
     # ---- checks
 

@@ -27,13 +27,16 @@ def check_report(compiled: CompiledModel) -> str:
 
 
 def _tied(compiled: CompiledModel) -> str:
-    """Which unknowns the constraints tie."""
-    if not compiled.constraints:
-        return ""
-    own = {one for value in compiled.constraints for one in value.free_symbols}
-    names = listed([one.name for one in compiled.unknowns if one.symbol in own])
-    count = len(compiled.constraints)
-    return f"{count} constraint{'s tie' if count > 1 else ' ties'} {names}."
+    """Which unknowns the constraints tie, and which drift."""
+    lines, count = [], len(compiled.constraints)
+    if count:
+        own = {one for value in compiled.constraints for one in value.free_symbols}
+        names = listed([one.name for one in compiled.unknowns if one.symbol in own])
+        lines.append(f"{count} constraint{'s tie' if count > 1 else ' ties'} {names}.")
+    for rates in compiled.drifts:
+        moving = listed([one.name for one, rate in zip(compiled.unknowns, rates, strict=True) if rate != 0])
+        lines.append(f"In C {moving} drift together, with a memory of {compiled.drift_s:g} s.")
+    return "\n".join(lines)
 
 
 def verdict(found: Identifiability) -> str:

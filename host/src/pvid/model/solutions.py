@@ -65,7 +65,8 @@ class Solutions:
         for _ in range(width + 2):
             values = [sp.Rational(one.numerator, one.denominator) for one in sampler.at_random(source)]
             out += [values[k : k + width] for k in range(0, len(values), width)]
-        slopes = [[self.point.of(sp.diff(one, symbol)) for symbol in p] for one in self.compiled.constraints]
+        known = [*self.compiled.constraints, *self.compiled.anchors]
+        slopes = [[self.point.of(sp.diff(one, symbol)) for symbol in p] for one in known]
         out += [[*one, *[sp.Integer(0)] * len(free)] for one in slopes]
         return sp.Matrix(out)
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import sympy as sp
 
+from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output, Part, Row, Signal, Together, Unknown
 from pvid.model.signals import Integral, Jet
 
@@ -56,6 +57,8 @@ def with_own(model: CompiledModel, own: Iterable[str], recordings: Sequence[str]
     chosen = set(own)
     if not chosen:
         return model
+    if model.drifts:
+        raise PvidError(f"{model.name} has a drift of its unknowns, which are not estimated for each recording apart")
     unknowns: list[Unknown] = []
     values: list[dict[sp.Symbol, sp.Symbol]] = [{} for _ in recordings]
     for one in model.unknowns:

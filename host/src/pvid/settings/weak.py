@@ -102,7 +102,7 @@ class ThetaModel:
     positive : of each parameter [n_p]
     c_row, c_column : of each non-zero of C [n_c]
     kind_end : one past the last theta of each kind
-    constraints : how many
+    constraints, drifts : how many
     """
 
     n_theta: int
@@ -111,6 +111,7 @@ class ThetaModel:
     c_column: tuple[int, ...]
     kind_end: tuple[int, ...]
     constraints: int = 0
+    drifts: int = 0
 
     @property
     def n_p(self) -> int:

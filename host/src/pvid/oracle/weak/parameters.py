@@ -165,6 +165,8 @@ class Parameters:
     def prior(self, start: Float) -> Float:
         """Information of the start in units of a step, diagonal [n_p]: weak, it only bounds what no row tells."""
         width = np.where(self.positive, np.maximum(self.sd / np.where(self.positive, start, 1.0), 1.0), self.sd)
+        for place, one in enumerate(self.model.p):
+            width[place] = self.model.anchors.get(one, width[place])
         return np.asarray(1 / width**2)
 
     def reach(self) -> Float:

@@ -192,6 +192,9 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
     parameters = fit.parameters
     out = []
     for k, one in enumerate(model.unknowns):
+        if one.symbol in model.anchors:  # what is known of it is not the run's
+            out.append(Judged())
+            continue
         p, limit = float(fit.p[k]), UNKNOWN * abs(float(fit.p[k]))
         own_scale = one.positive and not parameters.positive[k]
         if not one.positive or own_scale:  # an offset of exactly 0 has an error all the same
@@ -309,6 +312,7 @@ def of_width(model: CompiledModel, fit: Fit, se: Float, by_model: Float, found: 
         names = listed(model.p_names[k] for k in lost)
         text = f"What the equations seem to lack may change {names} by more than {percent(UNKNOWN)}."
         out.append(Reason("model_error", text, of=of_some(model, lost)))
+    known &= [one not in model.anchors for one in model.p]
     wide = [int(k) for k in np.flatnonzero(known & (se > WIDE * size)) if k not in lost]
     if wide:
         names = listed(model.p_names[k] for k in wide)
