@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.core.native import Native
+from pvid.core.sources import INCLUDES, core_sources
 from pvid.identification.analysis import analysed
 from pvid.identification.core import identify_in_c
 from pvid.identification.road import identified
@@ -86,6 +89,16 @@ def test_a_curvature_above_the_information_keeps_the_core_from_settling() -> Non
     """The law neglects it (theory.md 4): with a reaction that large Gauss-Newton has no stable point here."""
     p, best, errors = cored("sphere", 4)
     assert 1e-2 < np.max(np.abs(p - best) / errors) < 0.3
+
+
+@pytest.mark.parametrize("room", [1, 2, 8])
+def test_the_core_compiles_without_a_warning_for_any_room(room: int, tmp_path: Path) -> None:
+    """gcc 12 took a scratch array of one constraint for uninitialised, and boards are built with warnings as errors."""
+    sizes = [f"-DPVID_MAX_CONSTRAINTS={room}", f"-DPVID_MAX_DRIFTS={min(room, 4)}", "-DPVID_MAX_P=8"]
+    options = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Werror", *sizes, *INCLUDES]
+    for source in core_sources():
+        if source.stem in ("constraints_f32", "drift_f32", "estimator_f32", "staged_f32", "assess_f32"):
+            subprocess.run(["gcc", *options, "-c", str(source), "-o", str(tmp_path / "object.o")], check=True)
 
 
 # ---- a mechanism: the torque constant is the back-EMF's, and the moment of inertia follows from it

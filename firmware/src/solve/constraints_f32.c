@@ -93,7 +93,7 @@ PVID_COLD void pvid_constraints_at_f32(pvid_constraints_f32 *self, const pvid_mo
     const size_t n = model->n_p;
     float flat[PVID_MAX_CONSTRAINTS * (1u + PVID_MAX_P)];
     float rows[PVID_MAX_CONSTRAINTS][WIDTH];
-    float length[PVID_MAX_CONSTRAINTS];
+    float length[PVID_MAX_CONSTRAINTS] = {0.0f}; /* compilers do not see that all of them are written */
     float weight[PVID_MAX_P];
     memset(self, 0, sizeof *self);
     model->constraints(p, flat);
