@@ -616,6 +616,9 @@ static void a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_i
     for (uint32_t steps = 0u; steps <= 3u; steps++) {
         start(&design, &config);
         design.sign_doubt = doubt;
+        config.estimator.noise_margin = 0.0f; /* so fast a motion excites little: no solve is to be held for that */
+        config.estimator.kappa_min = 0.0f;
+        config.trust.kappa_min = 0.0f;
         assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
         uint32_t dropped = 0u;
         for (uint32_t tick = 0u; tick < (10u * HOP); tick++) {
