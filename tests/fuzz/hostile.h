@@ -9,7 +9,7 @@
 
 static uint64_t hostile_state;
 
-static uint64_t hostile_random(void)
+static inline uint64_t hostile_random(void)
 {
     hostile_state ^= hostile_state << 13;
     hostile_state ^= hostile_state >> 7;
@@ -17,7 +17,7 @@ static uint64_t hostile_random(void)
     return hostile_state;
 }
 
-static void hostile_seed(uint64_t seed)
+static inline void hostile_seed(uint64_t seed)
 {
     hostile_state = (seed * 0x9E3779B97F4A7C15u) | 1u;
     for (int i = 0; i < 10; i++) {
@@ -26,22 +26,22 @@ static void hostile_seed(uint64_t seed)
 }
 
 /* 0..n-1 */
-static uint32_t below(uint32_t n)
+static inline uint32_t below(uint32_t n)
 {
     return (uint32_t)(hostile_random() >> 33) % n;
 }
 
-static bool one_in(uint32_t n)
+static inline bool one_in(uint32_t n)
 {
     return below(n) == 0u;
 }
 
-static uint32_t any_word(void)
+static inline uint32_t any_word(void)
 {
     return (uint32_t)(hostile_random() >> 32);
 }
 
-static int32_t any_i32(void)
+static inline int32_t any_i32(void)
 {
     const uint32_t word = any_word();
     int32_t value;
@@ -50,19 +50,19 @@ static int32_t any_i32(void)
 }
 
 /* Any magnitude, none more likely than another. */
-static int32_t any_size_i32(void)
+static inline int32_t any_size_i32(void)
 {
     return one_in(2) ? any_i32() : (int32_t)((any_word() >> 1) >> below(31));
 }
 
 /* 0..1 */
-static float any_part(void)
+static inline float any_part(void)
 {
     return (float)((double)(hostile_random() >> 11) / 9007199254740992.0);
 }
 
 /* Any 32 bits: NaN, infinities and subnormals among them. */
-static float any_float(void)
+static inline float any_float(void)
 {
     const uint32_t word = any_word();
     float value;
@@ -70,7 +70,7 @@ static float any_float(void)
     return value;
 }
 
-static float hostile_float(void)
+static inline float hostile_float(void)
 {
     static const float edges[] = {0.0f,  -0.0f, 1.0f, -1.0f, 1.0e-45f, 1.17549435e-38f, 3.4e38f,   -3.4e38f,
                                   1e-6f, 1e6f,  0.9f, 1e19f, 1e-19f,   65504.0f,        16777216.f};
@@ -91,7 +91,7 @@ static float hostile_float(void)
 #define HOSTILE_SIGNALS 12u
 
 /* A sample of one kind of garbage, from any bits to a plausible lie: phi [rad], y [m]. */
-static void hostile_sample(uint32_t kind, unsigned long tick, float *phi, float *y)
+static inline void hostile_sample(uint32_t kind, unsigned long tick, float *phi, float *y)
 {
     static float slow;
     static float fast;
@@ -151,7 +151,7 @@ static void hostile_sample(uint32_t kind, unsigned long tick, float *phi, float 
 }
 
 /* A count of a sensor with that full scale. */
-static int32_t hostile_count(int32_t full_scale)
+static inline int32_t hostile_count(int32_t full_scale)
 {
     switch (below(5)) {
     case 0:
@@ -165,15 +165,15 @@ static int32_t hostile_count(int32_t full_scale)
     }
 }
 
-static int32_t count_of(float value, double lsb)
+static inline int32_t count_of(float value, double lsb)
 {
     const double counts = (double)value / lsb;
     return (isfinite(counts) && (fabs(counts) < 2.0e9)) ? (int32_t)counts : ((value < 0.0f) ? INT32_MIN : INT32_MAX);
 }
 
 /* The same in counts; lsb of phi [rad] and of y [m]. */
-static void hostile_counts(uint32_t kind, unsigned long tick, const double lsb[2], const int32_t full_scale[2],
-                           int32_t *phi, int32_t *y)
+static inline void hostile_counts(uint32_t kind, unsigned long tick, const double lsb[2], const int32_t full_scale[2],
+                                  int32_t *phi, int32_t *y)
 {
     if (kind < 2u) {
         *phi = hostile_count(full_scale[0]);
