@@ -56,6 +56,8 @@ static const uint32_t layout[] = {
     PVID_MAX_FUNCTIONS,
     PVID_MAX_BLOCKS,
     PVID_MAX_WINDOWS,
+    PVID_MAX_CONSTRAINTS,
+    PVID_MAX_DRIFTS,
 };
 
 static const pvid_snapshot_pointer pointers[] = {
