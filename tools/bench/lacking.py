@@ -150,7 +150,8 @@ def _sgn(v: float) -> float:
     return tanh(v / _SWITCH)
 
 
-# Name, terms that name it rightly ({x}: the sensor, {m}: its rate, or itself where it measures a rate), the shape.
+# Name, terms that name it rightly ({x}: the sensor, {m}: its rate, or itself where it measures a rate, {o}: a parameter
+# that is a load or an offset, {c}: that of dry friction; "": there is none), the shape.
 _MOTIONS: tuple[tuple[str, tuple[str, ...], Shape], ...] = (
     ("dry friction", ("sgn({m})",), lambda x, v, t: _sgn(v)),
     ("friction in one direction", ("sgn({m})", "1"), lambda x, v, t: max(_sgn(v), 0.0)),
@@ -159,21 +160,21 @@ _MOTIONS: tuple[tuple[str, tuple[str, ...], Shape], ...] = (
     ("Stribeck friction", ("sgn({m})", "sgn({m})/(1 +"), lambda x, v, t: _sgn(v) * (0.5 + 0.5 / (1 + (v / 0.15) ** 2))),
     ("soft friction", ("sgn({m})", "the friction is soft"), lambda x, v, t: tanh(v / 0.2)),
     ("friction of a place", ("sgn({m})",), lambda x, v, t: _sgn(v) * (1 + 0.5 * x)),
-    ("friction that runs in", ("sgn({m})",), lambda x, v, t: _sgn(v) * exp(-3 * t)),
+    ("friction that runs in", ("sgn({m})", "{c} changes"), lambda x, v, t: _sgn(v) * exp(-3 * t)),
     ("square drag", ("abs({m})*{m}",), lambda x, v, t: abs(v) * v),
     ("cubic drag", ("{m}**3",), lambda x, v, t: v**3),
     ("damping of one direction", ("abs({m})",), lambda x, v, t: max(v, 0.0)),
     ("damping of a place", ("{x}**2*{x}.d()",), lambda x, v, t: x * x * v),
     ("constant load", ("1",), lambda x, v, t: 1.0),
-    ("step of the load", (), lambda x, v, t: float(t > 0.5)),
-    ("drift of the load", (), lambda x, v, t: t - 0.5),
+    ("step of the load", ("the load of {row} ", "{o} changes"), lambda x, v, t: float(t > 0.5)),
+    ("drift of the load", ("the load of {row} ", "{o} changes"), lambda x, v, t: t - 0.5),
     ("load of another frequency", (), lambda x, v, t: float(np.sin(180 * t))),
     ("pushes", (), lambda x, v, t: float(t * 17 % 1 < 0.06)),
     ("cubic spring", ("{x}**3",), lambda x, v, t: x**3),
     ("square spring", ("abs({x})*{x}",), lambda x, v, t: abs(x) * x),
     ("even spring", ("{x}**2",), lambda x, v, t: x * x),
     ("preload of a spring", ("sgn({x})",), lambda x, v, t: tanh(x / 0.01)),
-    ("stop", (), lambda x, v, t: 5 * (max(x - 1.2, 0.0) + min(x + 1.2, 0.0))),
+    ("stop", ("({x} +",), lambda x, v, t: 5 * (max(x - 1.2, 0.0) + min(x + 1.2, 0.0))),
 )
 # The part of sgn({m}), and of {m}, that a law is of: from and to.
 _OF_SIGN = {
@@ -211,7 +212,8 @@ def _laws_of(plant: Plant, axis: Axis) -> Iterator[Effect]:
         return lambda s, t: axis.force * shape(s[axis.x] / scale, s[place_of_rate] / v_rms, t / span)
 
     def effect(name: str, named: tuple[str, ...], law: Law, memory: Law | None = None) -> Effect:
-        terms = tuple(one.format(m=motion, x=axis.sensor) for one in named)
+        own = {"m": motion, "x": axis.sensor, "o": plant.offset, "c": axis.coulomb, "row": f"equation {axis.row + 1}"}
+        terms = tuple(text for one in named if not (text := one.format(**own)).startswith(" "))
         parts = (
             (axis.coulomb, _OF_SIGN, axis.force),
             (axis.viscous, _OF_RATE, axis.force / v_rms),
@@ -222,7 +224,7 @@ def _laws_of(plant: Plant, axis: Axis) -> Iterator[Effect]:
         return Effect(plant.name, f"{name} ({axis.sensor})", terms, FORCES, law, axis.row, memory=memory, adds=adds)
 
     for name, named, shape in _MOTIONS:
-        if axis.v is not None or "{x}" not in "".join(named) or name == "even spring":  # others are motions of a level
+        if axis.v is not None or "{x}" not in "".join(named) or name in ("even spring", "stop"):  # others: of a place
             yield effect(name, named, law(shape, x_rms))
     for name, named, shape in _OF_ANGLES if axis.angle else ():
         yield effect(name, named, law(shape, 1.0))
@@ -259,7 +261,12 @@ _INPUTS: tuple[tuple[str, tuple[str, ...], tuple[float, ...], Callable[[Float, f
     ("play", (), (0.01, 0.03, 0.08, 0.2, 0.4), lambda u, width: _play(u, 0.0, width)),
     ("coarse steps", (), (0.01, 0.03, 0.08, 0.2, 0.4), lambda u, step: step * np.round(u / step)),
     ("limited rate", _LATE_NAMES, (0.5, 0.2, 0.1, 0.05, 0.02), lambda u, step: _limited(u, step)),
-    ("drift of the gain", (), (0.01, 0.03, 0.1, 0.2, 0.4), lambda u, part: u * (1 - part * np.linspace(0, 1, len(u)))),
+    (
+        "drift of the gain",
+        ("the gain of {u} changes",),
+        (0.01, 0.03, 0.1, 0.2, 0.4),
+        lambda u, part: u * (1 - part * np.linspace(0, 1, len(u))),
+    ),
     (
         "another gain to one side",
         ("where it is negative",),
@@ -318,7 +325,12 @@ _SENSORS: tuple[tuple[str, tuple[str, ...], tuple[float, ...], Callable[[Float, 
     ("noise", (), (0.001, 0.003, 0.01, 0.03, 0.1), lambda x, sd: _noisy(x, 0.0, sd)),
     ("spikes", (), (0.03, 0.1, 0.3, 1, 3), _spiked),
     ("held samples", _LATE_NAMES, (2, 3, 5, 8, 12), lambda x, every: _held(x, round(every))),
-    ("drift of the offset", (), (0.003, 0.01, 0.03, 0.1, 0.3), lambda x, part: x + part * np.linspace(0, 1, len(x))),
+    (
+        "drift of the offset",
+        ("the offset of {x} changes",),
+        (0.003, 0.01, 0.03, 0.1, 0.3),
+        lambda x, part: x + part * np.linspace(0, 1, len(x)),
+    ),
     (
         "mean of samples",
         _LATE_NAMES,
@@ -373,7 +385,7 @@ def _values_of(plant: Plant) -> Iterator[Effect]:
             ("steps", lambda s, t: float(t > 0.6 * span)),
         )
         for word, course in courses:
-            yield Effect(plant.name, f"{name} {word}", (), _CHANGES, value=name, course=course)
+            yield Effect(plant.name, f"{name} {word}", (f"{name} changes",), _CHANGES, value=name, course=course)
         for axis in plant.axes:
 
             def saturating(s: States, t: float, axis: Axis = axis, rms: float = float(plant.sizes[axis.x])) -> float:
@@ -541,7 +553,7 @@ def outcome(plant: Plant, seed: int, *acting: tuple[Effect, float]) -> Outcome:
 def _is_named(term: Term, parts: Sequence[str]) -> bool:
     """Of a law with a width the part before it is the name."""
     if term.law is None:
-        return any(part in term.text for part in parts)
+        return any(part in term.text for part in parts if part != "1")
     return any(term.law == part or (part.endswith("+") and term.law.startswith(part)) for part in parts)
 
 
@@ -683,7 +695,8 @@ class Told:
         return any(_is_named(term, effect.named) for effect, _ in self.case.acting)
 
     def _among(self, text: str) -> bool:
-        return any(name in text for effect, _ in self.case.acting for name in effect.named if name != "1")
+        names = ["a constant of" if name == "1" else name for effect, _ in self.case.acting for name in effect.named]
+        return any(name in text for name in names)
 
 
 def told(case: Case, seed: int) -> Told | None:

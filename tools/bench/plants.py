@@ -95,6 +95,11 @@ class Plant:
         return next((one.name for one in self.model().signals if one.kind == "input"), "")
 
     @property
+    def offset(self) -> str:
+        """A parameter that is a load, or an offset of a sensor; "": there is none."""
+        return next((one.name for one in self.model().unknowns if not one.positive), "")
+
+    @property
     def values(self) -> dict[str, float]:
         """Parameters and constants."""
         return {**self.truth, **self.constants}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import copy
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,13 +19,37 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import record_of
 from pvid.oracle.weak.scores import Scores, between
 from pvid.oracle.weak.solve import Fit
-from pvid.oracle.weak.terms import ACTS, CONSTANT, GAIN, LAWS, SOFT, SOFT_WIDTHS, Act, Candidate, Change, Law, Recorded
+from pvid.oracle.weak.terms import (
+    ACTS,
+    CONSTANT,
+    GAIN,
+    GRADUAL,
+    JUMPS,
+    LAWS,
+    OF_GAIN,
+    OF_LOAD,
+    OF_OFFSET,
+    OF_PARAMETER,
+    OFFSET,
+    SOFT,
+    SOFT_WIDTHS,
+    Act,
+    Candidate,
+    Change,
+    Course,
+    Law,
+    Recorded,
+)
 
 _RATE = (21, 2)  # samples and degree that give a sensor's rate in a law
 
 # A law that an equation has already is there in another size: this part of the term is the most that is believed.
 _ALIKE = 0.99  # cosine of the two columns
 _PART = 0.3
+
+# What is a candidate as it is, and as it changes during the run.
+_COURSES = ((GAIN, OF_GAIN), (OFFSET, OF_OFFSET), (CONSTANT, OF_LOAD))
+_MOST_GAIN = 0.6  # largest believable change of a gain
 
 _STEP = 1e-3  # of a signal's size: of the differences that give a column
 
@@ -73,28 +98,43 @@ class Library:
     @cached_property
     def candidates(self) -> list[Candidate]:
         """All, without scores."""
+        return [*self._steady, *(one for whole in self._changing for one in self._in_time(whole))]
+
+    @cached_property
+    def _steady(self) -> list[Candidate]:
+        """What is the same all the time."""
         return [*self._laws(), *self._soft_frictions(), *self._acts()]
 
+    def _sums(self, laws: Sequence[Law], values: Sequence[Float]) -> Float:
+        """Of laws, from their values at the steps [laws, windows, K]."""
+        functions = self.fit.rows.functions
+        sums = functions.window_sums(np.array(values))[:, self.fit.rows.numbers]
+        tables = {law.order: (-1.0) ** law.order * functions.combine(law.order) for law in laws}
+        return np.array([own @ tables[law.order] for own, law in zip(sums, laws, strict=True)])
+
+    def _motion(self, one: Recorded) -> tuple[Float, Float]:
+        """A signal and its rate at the steps."""
+        places, rate = self.fit.rows.record.grid.places, polynomial_weights(*_RATE, 1) * self.design.sample_rate
+        return np.nan_to_num(one.values[places]), np.nan_to_num(filtered(one.values, rate)[places])
+
     def _laws(self) -> Iterator[Candidate]:
-        grid, functions, rows = self.fit.rows.record.grid, self.fit.rows.functions, self.fit.rows
-        rate = polynomial_weights(*_RATE, 1) * self.design.sample_rate
+        grid, rows = self.fit.rows.record.grid, self.fit.rows
         named: list[tuple[str, Law, float]] = [("", CONSTANT, 0.0)]
         values: list[Float] = [np.ones(grid.size)]
         for one in self._recorded():
             if one.signal.kind != "sensor" or one.signal.driven:
                 continue
-            x, v = (np.nan_to_num(each[grid.places]) for each in (one.values, filtered(one.values, rate)))
+            x, v = self._motion(one)
             turns = one.signal.unit == "rad" and float(np.ptp(x)) > np.pi / 2
             changes = float(np.min(x)) < 0 < float(np.max(x))
             for law in LAWS:
                 if (law.angle and not turns) or (law.signs and not changes):
                     continue
-                width = float(f"{law.width * float(np.sqrt(np.mean(v**2))):.2g}")
+                width = law.part * float(np.max(np.abs(x))) or law.width * float(np.sqrt(np.mean(v**2)))
+                width = float(f"{width:.2g}")
                 named.append((one.signal.name, law, width))
                 values.append(law.of(x, v, width))
-        sums = functions.window_sums(np.array(values))[:, rows.numbers]
-        tables = {law.order: (-1.0) ** law.order * functions.combine(law.order) for _, law, _ in named}
-        sums = np.array([own @ tables[law.order] for own, (_, law, _) in zip(sums, named, strict=True)])
+        sums = self._sums([law for _, law, _ in named], values)
         theta = self.fit.parameters.theta(self.fit.p)
         for kind, row in enumerate(self.model.rows):
             largest = _believable(rows.columns[kind], theta[kind], sums)
@@ -111,9 +151,11 @@ class Library:
         speed = numpy_function(symbols, argument)(*[grid.jets[one] for one in symbols])
         rms = float(np.sqrt(np.mean(np.square(speed))))
         for part in SOFT_WIDTHS:
-            soft = replace(self.design, reversals="soft", soft=part * rms)
-            change = self.scores.change_to(record_of(self.fit.rows.compiled, self.run, soft), -1.0)
-            yield Candidate(str(argument), str(argument), SOFT, part * rms, change)
+            yield Candidate(str(argument), str(argument), SOFT, part * rms, self._softened(part * rms))
+
+    def _softened(self, width: float) -> Change:
+        soft = replace(self.design, reversals="soft", soft=width)
+        return self.scores.change_to(record_of(self.fit.rows.compiled, self.run, soft), -1.0)
 
     def _acts(self) -> Iterator[Candidate]:
         for one in self._recorded():
@@ -121,6 +163,59 @@ class Library:
                 if act.applies(one):
                     for level in act.tried(one):
                         yield self.act(one, act, level)
+
+    @cached_property
+    def _changing(self) -> list[Candidate]:
+        """What may change during the run, as if it did so all the time: parameters, and of the other candidates gains,
+        offsets and constants."""
+        rows, parameters = self.fit.rows, self.fit.parameters
+        slopes, unit = parameters.jacobian(self.fit.p), parameters.unit(self.fit.p)
+        out = []
+        for k, name in enumerate(parameters.names):
+            change = [
+                np.einsum("wjk,j->wk", own[:, : len(of)], of[:, k])
+                for own, of in zip(rows.columns, slopes, strict=True)
+            ]
+            out.append(Candidate(name, "", OF_PARAMETER, 0.0, _fixed(change), float(unit[k])))
+        for one in self._steady:
+            course = next((course for kind, course in _COURSES if one.kind is kind), None)
+            if course is not None:
+                out.append(replace(one, kind=course, top=1.0, most=_MOST_GAIN if course is OF_GAIN else one.most))
+        return out
+
+    def _in_time(self, one: Candidate) -> Iterator[Candidate]:
+        """Gradually and at once."""
+        for level, weights in self._courses:
+            yield replace(one, level=level, weights=weights)
+
+    @cached_property
+    def _courses(self) -> list[tuple[float, Float]]:
+        """Times of the jumps [s], 0 of what is gradual, and how far each is there [windows]."""
+        begin, end, last = self._spans
+        gradual = [(0.0, course((begin + end) / 2)) for course in GRADUAL]
+        return gradual + [(part * last, self._jumped(part * last)) for part in JUMPS]
+
+    def _jumped(self, at: float) -> Float:
+        """How much of each window is behind a time [s] [windows]."""
+        begin, end, last = self._spans
+        return np.clip((end - at / last) / (end - begin), 0, 1)
+
+    def jumps_near(self, one: Candidate, part: float) -> list[Candidate]:
+        """The same a part of the run earlier, and later."""
+        times = [one.level + part * sign * self._spans[2] for sign in (-1, 0, 1)]
+        return [replace(one, level=at, weights=self._jumped(at)) for at in times]
+
+    @cached_property
+    def _spans(self) -> tuple[Float, Float, float]:
+        """Begin and end of each window, in parts of its recording [windows], and the longest recording [s]."""
+        rows = self.fit.rows
+        end, length = rows.end_times(), 2 * rows.functions.hop * rows.functions.dt
+        begin, last = end - length, 0.0
+        for number in np.unique(rows.recordings):
+            own = rows.recordings == number
+            first, whole = begin[own].min(), end[own].max() - begin[own].min()
+            begin[own], end[own], last = (begin[own] - first) / whole, (end[own] - first) / whole, max(last, whole)
+        return begin, end, last
 
     def act(self, recorded: Recorded, act: Act, level: float) -> Candidate:
         """One at a level."""
@@ -133,6 +228,42 @@ class Library:
         record = record_of(self.fit.rows.compiled, {**self.run, name: other}, self.design)
         return Candidate(name, name, act, level, self.scores.change_to(record, step), recorded.top, act.most(recorded))
 
+    @cached_property
+    def _again(self) -> Library:
+        """Of the run with as much noise of the sensors again."""
+        random, run = np.random.default_rng(0), dict(self.run)
+        for one in self.model.signals:
+            if one.sd:
+                run[one.name] = np.asarray(run[one.name]) + one.sd * random.normal(size=np.size(run[one.name]))
+        rows = copy.copy(self.fit.rows)
+        rows.columns = self.scores.columns_of(record_of(rows.compiled, run, self.design))
+        return Library(run, self.design, replace(self.fit, rows=rows))
+
+    @cached_property
+    def noise(self) -> Change:
+        """What as much noise again adds to the residuals."""
+        return between(self.fit.rows.columns, self._again.fit.rows.columns, 1.0)
+
+    def noise_in(self, one: Candidate) -> Change:
+        """What as much noise again adds to a candidate's change."""
+        other = self._again._remade(one).changed
+        return lambda theta: [now - before for now, before in zip(other(theta), one.changed(theta), strict=True)]
+
+    def _remade(self, one: Candidate) -> Candidate:
+        """A candidate of another run, from this one."""
+        if isinstance(one.kind, Act):
+            return self.act(self.recorded(one.signal), one.kind, one.level)
+        if isinstance(one.kind, Course):
+            return replace(one, change=next(other for other in self._changing if other.family == one.family).change)
+        if one.kind is SOFT:
+            return replace(one, change=self._softened(one.level))
+        x, v = (np.ones(self.fit.rows.record.grid.size),) * 2
+        if one.signal:
+            x, v = self._motion(self.recorded(one.signal))
+        kind = next(kind for kind, row in enumerate(self.model.rows) if row.name == one.where)
+        sums = self._sums([one.kind], [one.kind.of(x, v, one.level)])[0]
+        return replace(one, change=_in_row(sums, kind, self.fit.rows.kinds))
+
     def recorded(self, name: str) -> Recorded:
         """A signal as recorded."""
         values, design = np.asarray(self.run[name], np.float64), self.design
@@ -144,9 +275,12 @@ class Library:
                 yield one
 
 
+def _fixed(change: list[Float]) -> Change:
+    return lambda theta: change
+
+
 def _in_row(sums: Float, kind: int, kinds: int) -> Change:
-    whole = [sums if kind == other else np.zeros(sums.shape) for other in range(kinds)]
-    return lambda theta: whole
+    return _fixed([sums if kind == other else np.zeros(sums.shape) for other in range(kinds)])
 
 
 def _believable(columns: Float, theta: Float, sums: Float) -> Float:

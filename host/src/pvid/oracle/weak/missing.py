@@ -10,6 +10,7 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from statistics import NormalDist
 
 import numpy as np
@@ -23,12 +24,14 @@ from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.scores import FOLDS, Scores
 from pvid.oracle.weak.solve import Fit, resumed
-from pvid.oracle.weak.terms import UNUSUAL, UNUSUAL_LAWS, Act, Candidate
+from pvid.oracle.weak.terms import CONSTANT, JUMPS, OF_PARAMETER, UNUSUAL, UNUSUAL_LAWS, Act, Candidate, Course
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
 _CERTAIN = 6.0  # |size| over its standard error
 _CHANCE = 1e-8  # of a size beyond the limit, where the residuals are within the sensors' noise
+_EMPTY = 0.3  # of the equations' own terms: a term that leaves less of them takes their place
+_BY_NOISE = 0.5  # of what a term explains: noise that is in it and in the residuals
 _SHARE = 0.01  # of the residuals' energy on unseen windows
 _PLAUSIBLE = 0.5  # of the best candidate's share: what may be meant as well
 
@@ -37,23 +40,27 @@ VISIBLE = 0.01  # of the value
 
 # Terms are named by fits with them.
 _MOST_TERMS = 3
-_LARGE = 0.25  # share of a term that is named even if it moves no parameter
+_LARGE = 0.05  # share of a term that is named even if it moves no parameter
 _FAMILIES = 5  # that are fitted for each
 _TRIED = 0.3  # of the best share
 _DISTINCT = 0.01  # of a column's square, that is its own: a term with less is the parameters in another guise
 _OF_BEST = 0.001  # the same of the term that explains most
 _SAME = 0.9999  # cosine of two columns, beside all parameters, that no run tells apart
 _RIVAL = 0.9  # of the best gain of likelihood
+_CHANGES = 0.5  # the same of what changes: its course is one of few, and what that leaves is no sign against another
+_EQUAL = 0.9999  # of the best gain: the same column
 _MOST_RIVALS = 5
-_NOISE = 2.0  # chi^2 that is the sensors'
+_NOISE, _NOTICED = 2.0, 1.5  # chi^2 that is the sensors'; from which a term that explains much is looked for
 # Of the residuals beyond it: a law that imitates the missing one explains half to nine tenths of them.
 _ALL, MOST = 0.95, 0.9
 _ROUNDS = 6  # of a size
 _SETTLED = 0.01  # of a size
+_NOTHING = 0.01  # of a parameter
 _BEYOND = 1.5  # times the largest level that is tried, or over the smallest one
 _AT_REST = 0.05  # of the variance of an equation's error
 _FACTORS, _STEPS = (1.25, 1.08, 1.025), 4  # of a level, as often as it gets better
 _PART = 0.01  # of a level: a step that gives its slope
+_HALVINGS = 4  # of the distance of two jumps
 _PASSES = 3  # of whitening in a fit that begins near its end
 
 
@@ -104,7 +111,8 @@ class Missing:
         """
         scores = library.scores if fit is None else Scores(fit)
         scored, p = scores.of(library.candidates), scores.fit.p
-        doubtful = chi2_of_sensors(scores.fit) < _NOISE  # the residuals are no sign that anything is missing
+        chi2 = chi2_of_sensors(scores.fit)
+        doubtful = chi2 < _NOISE  # the residuals are no sign that anything is missing
         # Standard errors from the scatter of few windows, which overlap, are themselves uncertain.
         surest = max((one.certainty for one in scored), default=0.0)
         least = _by_chance(len(scores.residuals) / 2, surest) if doubtful else _CERTAIN
@@ -114,6 +122,9 @@ class Missing:
             if one.certainty > least * (max(1.0, _DISTINCT / max(one.own, 1e-300)) ** 0.5 if doubtful else 1.0)
             if one.share > _SHARE and one.folds >= FOLDS - 1
             if fit is None or one.own > _DISTINCT
+            if scores.leaves(one) > _EMPTY
+            if one.share * chi2 * _BY_NOISE**2 > 1  # the noise in it explains at most 1 / chi2
+            or scores.by_noise(one, library.noise, library.noise_in(one)) < _BY_NOISE
         )
         plausible = [one for one in there if one.share >= _PLAUSIBLE * there[0].share]
         shifts = np.array([one.shift for one in plausible if one.own > _DISTINCT or one is there[0]]).reshape(
@@ -134,7 +145,7 @@ class Missing:
     @property
     def is_large(self) -> bool:
         """Whether a term explains much of what the sensors' noise does not, whether or not it moves a parameter."""
-        return bool(self.there) and self.there[0].share > _LARGE and chi2_of_sensors(self.scores.fit) > _NOISE
+        return bool(self.there) and self.there[0].share > _LARGE and chi2_of_sensors(self.scores.fit) > _NOTICED
 
     def groups(self) -> list[list[Candidate]]:
         """Families that may be meant, of each its best, those together that no run tells apart; in each group, and of
@@ -215,23 +226,29 @@ def explained(library: Library, found: Missing) -> Explained:
         best = next(group for group in distinct if group[0].family == gains[0][1].family)
         gains = sorted(gains + _gains(library, fit, before, best[1:_FAMILIES]), key=lambda one: -one[0])
         alike = [one for one in gains if one[0] > _RIVAL * gains[0][0]]
-        _, chosen, fit = min(alike, key=lambda one: _is_unusual(one[1]))
+        equal = _EQUAL * gains[0][0]
+        _, chosen, fit = min(alike, key=lambda one: (_is_unusual(one[1]), one[0] < equal, not _is_simple(one[1])))
         # Beside those: what is the same column as one of them, and what explains as much and was not tried.
+        nearly = partial(_rival, chosen)
         families = [one.family for _, one, _ in alike]
-        untried = [
+        rivals = [one for gain, one, _ in gains if gain > nearly(one) * gains[0][0] and one.family != chosen.family]
+        tried = [one.family for _, one, _ in gains]
+        rivals += [
             one
             for group in groups
             for one in group
-            if (group[0].family in families if group in distinct else one.share > _RIVAL * best[0].share)
+            if (group[0].family in families if group in distinct else one.share > nearly(one) * best[0].share)
+            and one.family not in tried
         ]
-        rivals = [one for _, one, _ in alike if one.family != chosen.family]
-        rivals += [one for one in untried if one.family not in families]
         found = Missing.of(library, uncertainty(fit).se, fit)
         if not complete:
             with_named, left = fit, chi2_of_sensors(fit)
             named.append(Named(chosen, _error_of(library, chosen, fit), tuple(rivals[:_MOST_RIVALS])))
             share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
-            complete = left < _NOISE or share > _ALL or share > MOST and not found.visible.any()
+            few = len(named) < _MOST_TERMS  # three terms imitate much
+            changes = any(isinstance(one.chosen.kind, Course) for one in named)  # imitates what follows the amplitude
+            complete = left < (_NOTICED if changes else _NOISE)
+            complete |= few and (share > _ALL or share > MOST and not changes and not found.visible.any())
         if complete and not found.visible.any():
             break
     return Explained(tuple(named), with_named, fit, share, complete)
@@ -257,8 +274,8 @@ def _error_of(library: Library, one: Candidate, with_it: Fit) -> float:
     if one.leveled:
         assert isinstance(one.kind, Act)
         step = _PART * one.level
-        other = library.act(library.recorded(one.signal), one.kind, one.level + step).change
-        near = one.change
+        other = library.act(library.recorded(one.signal), one.kind, one.level + step).changed
+        near = one.changed
 
         def change(theta: Sequence[Float]) -> list[Float]:
             return [now - before for now, before in zip(other(theta), near(theta), strict=True)]
@@ -274,8 +291,19 @@ def word_of(one: Candidate) -> str:
 
 def _is_unusual(one: Candidate) -> bool:
     """Of terms that explain a run alike those that are less often the cause: a signal that is early, and the cosine of
-    an angle beside an offset of its sensor."""
-    return word_of(one) in UNUSUAL or one.kind in UNUSUAL_LAWS
+    an angle beside an offset of its sensor, and what changes during the run."""
+    return word_of(one) in UNUSUAL or one.kind in UNUSUAL_LAWS or isinstance(one.kind, Course)
+
+
+def _rival(chosen: Candidate, one: Candidate) -> float:
+    """Part of the best gain from which a term may be meant in place of the chosen one."""
+    return _CHANGES if isinstance(chosen.kind, Course) and isinstance(one.kind, Course) else _RIVAL
+
+
+def _is_simple(one: Candidate) -> bool:
+    """Of terms that are the same column: a constant, of what is the same where a signal does not change its sign, and a
+    parameter of what changes."""
+    return one.kind in (CONSTANT, OF_PARAMETER)
 
 
 def unlikelihood(fit: Fit) -> float:
@@ -288,7 +316,7 @@ def corrected(fit: Fit, term: Candidate) -> Fit:
     """The fit with a term of its size, weights anew."""
     rows, theta = copy.copy(fit.rows), fit.parameters.theta(fit.p)
     rows.columns = [one.copy() for one in rows.columns]
-    for own, moved, th in zip(rows.columns, term.change(theta), theta, strict=True):
+    for own, moved, th in zip(rows.columns, term.changed(theta), theta, strict=True):
         own[:, len(th)] -= term.size * moved
     return resumed(rows, fit, _PASSES)
 
@@ -298,10 +326,29 @@ def _refitted(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fi
     if isinstance(one.kind, Act) and one.kind.exact:
         one = replace(one, kind=one.kind.exact, level=one.size, size=1.0)
     try:
+        if isinstance(one.kind, Course) and one.level:
+            one = _nearest_jump(library, fit, one)
         with_it = _leveled(library, fit, one) if one.leveled else _sized(fit, one)
     except (np.linalg.LinAlgError, ArithmeticError, PvidError):
         return None
-    return with_it if with_it is None or _is_nearer(with_it[1], fit) else None
+    if with_it is None or not _is_nearer(with_it[1], fit) or _takes_place(with_it[1], fit):
+        return None
+    return with_it
+
+
+def _takes_place(one: Fit, other: Fit) -> bool:
+    """Whether next to nothing is left of a parameter: the term is there in its place."""
+    positive = other.parameters.positive
+    return bool(np.any(one.p[positive] < _NOTHING * other.p[positive]))
+
+
+def _nearest_jump(library: Library, fit: Fit, one: Candidate) -> Candidate:
+    """A change at the time at which it explains most."""
+    scores, part = Scores(fit), JUMPS[1] - JUMPS[0]
+    for _ in range(_HALVINGS):
+        part /= 2
+        one = scores.of(library.jumps_near(one, part))[0]
+    return one
 
 
 def _is_nearer(one: Fit, other: Fit) -> bool:
@@ -329,12 +376,12 @@ def _are_alike(before: Sequence[EquationError], after: Sequence[EquationError]) 
     return all(abs(a.variance - b.variance) <= _AT_REST * b.variance for a, b in zip(before, after, strict=True))
 
 
-def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit]:
+def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit] | None:
     assert isinstance(one.kind, Act)
     act, recorded = one.kind, library.recorded(one.signal)
     # A level far from those that are tried takes the signal away: 0 = 0 fits every run.
     tried = [abs(level) for level in act.tried(recorded)]
-    least, most = min(tried, default=0.0) / _BEYOND, max(tried, default=np.inf) * _BEYOND
+    least, most = min(tried, default=0.0) / _BEYOND, min(max(tried, default=np.inf) * _BEYOND, one.most)
 
     def at(level: float, near: Fit = fit) -> tuple[float, Candidate, Fit]:
         own = replace(one, level=level, size=1.0, change=library.act(recorded, act, level).change)
@@ -356,4 +403,4 @@ def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit
         if _are_alike(best[2].errors, again[2].errors) or not again[0] < best[0]:
             break
         best = again
-    return best[1], best[2]
+    return None if abs(best[1].level) * _FACTORS[-1] > one.most else (best[1], best[2])  # it would be larger yet

@@ -16,7 +16,7 @@ from pvid.oracle.weak.errors import Uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.missing import VISIBLE, Explained, Missing, word_of
 from pvid.oracle.weak.solve import Fit
-from pvid.oracle.weak.terms import CONSTANT, SOFT, Act, Candidate, Law
+from pvid.oracle.weak.terms import CONSTANT, SOFT, Act, Candidate, Course, Law
 from pvid.oracle.weak.verdict import Name, Reason, of_some
 
 _GROSS = 100.0  # chi^2, from which motion that is left unexplained is a doubt
@@ -71,6 +71,9 @@ def terms_of(fit: Fit, found: Explained) -> tuple[Term, ...]:
             unit = {"signal": model.signal(term.signal).unit, "time": "s", "part": "", "percent": ""}[term.kind.measure]
             if term.kind.typed:
                 typed = f"{term.signal}: {term.kind.typed.replace('{u}', term.signal)}"
+        elif isinstance(term.kind, Course):
+            unit = _unit_of(model, term, term.kind)
+            factor = scale[term.where] if term.kind.measure == "equation" else 1 / term.top
         elif term.kind is not SOFT:
             law, factor, unit = _law(term), scale[term.where], None
             own = "{a}" if term.kind is CONSTANT else f"{{a}}*{law}"
@@ -156,6 +159,8 @@ def in_words(model: CompiledModel, one: Candidate, scale: Mapping[str, float | N
     kind = one.kind
     if kind is SOFT:
         return kind.text.format(x=one.signal, w=f"{one.level:.2g}")
+    if isinstance(kind, Course):
+        return _of_course(model, one, kind, scale)
     if isinstance(kind, Law):
         law, factor = _law(one), scale[one.where]
         verb = "seem" if one.where.startswith("equations") else "seems"
@@ -173,6 +178,20 @@ def in_words(model: CompiledModel, one: Candidate, scale: Mapping[str, float | N
     }[kind.measure]
     text = kind.text.format(size=size, word=word_of(one), u=one.signal, top=f"{one.top:.3g}")
     return f"{one.signal} seems to be {text[3:]}" if text.startswith("is ") else f"{one.signal} {text}"
+
+
+def _of_course(model: CompiledModel, one: Candidate, kind: Course, scale: Mapping[str, float | None]) -> str:
+    amount = one.size / (scale[one.where] or 1.0) if kind.measure == "equation" else one.size * one.top
+    size = percent(amount) if kind.measure == "percent" else with_unit(amount, _unit_of(model, one, kind), 3)
+    when = f"at {with_unit(one.level, 's', 3)}" if one.level else "in the course of the run"
+    return f"{kind.text.format(name=one.where, size=size)} {when}"
+
+
+def _unit_of(model: CompiledModel, one: Candidate, kind: Course) -> str:
+    """Of the change; "" of an equation's, which has the unit of its terms."""
+    if kind.measure == "parameter":
+        return next(own.unit for own in model.unknowns if own.name == one.where)
+    return model.signal(one.signal).unit if kind.measure == "signal" else ""
 
 
 def _law(one: Candidate) -> str:

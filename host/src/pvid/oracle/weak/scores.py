@@ -30,9 +30,6 @@ FOLDS = 4  # contiguous parts of each recording: p and sizes from three, the sha
 # A column of which the parameters explain all but this part is theirs: no data show it.
 _OWN = 1e-4
 
-# What cancels the known side of the rows leaves 0 = 0, which every estimate explains.
-_CANCELS = 0.25
-
 # What replaces a signal as a whole has a column of size 1.
 _WHOLE = (0.4, 2.5)
 
@@ -68,7 +65,7 @@ class Scores:
 
     def shift(self, one: Candidate) -> Float:
         """What p moves by when a term of size 1 is added [n_p]."""
-        return self.shift_by(one.change(self.theta))
+        return self.shift_by(one.changed(self.theta))
 
     def change_to(self, record: Record, step: float) -> Change:
         """Residuals with other channels less those with the recorded ones, over a step."""
@@ -85,7 +82,7 @@ class Scores:
 
     def white(self, candidates: Sequence[Candidate]) -> Float:
         """Columns of candidates [windows, candidates, rows of all kinds]."""
-        return self._whitened([one.change(self.theta) for one in candidates])
+        return self._whitened([one.changed(self.theta) for one in candidates])
 
     def whitened(self, change: Sequence[Float]) -> Float:
         """Of the change of each kind's raw residuals [windows, K]: [windows, rows of all kinds]."""
@@ -134,9 +131,56 @@ class Scores:
         rest = c - (c @ slopes) @ self.inverse.T @ slopes.T
         return np.asarray(rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300))
 
+    def by_noise(self, one: Candidate, noise: Change, noise_in: Change) -> float:
+        """Part of what a term seems to explain that it does because it has the noise of the residuals in it.
+
+        Parameters
+        ----------
+        noise, noise_in : what as much noise again adds to the residuals, and to the term
+        """
+        c, its, r = (self.whitened(change(self.theta)) for change in (one.changed, noise_in, noise))
+        mixed = np.einsum("wkp,wk->p", self.slopes, c) @ self.inverse
+        of_noise = np.einsum("wkp,wk->p", self.slopes, its) @ self.inverse
+        explained = float(np.sum((c - self.slopes @ mixed) * self.residuals))
+        return float(np.sum((its - self.slopes @ of_noise) * r)) / explained if explained else 0.0
+
+    def leaves(self, one: Candidate) -> float:
+        """Part of the equations' own terms that is left when a term is added, constants aside: where next to nothing
+        is, 0 = 0 explains every run.
+        """
+        after, out = self.fit.parameters.theta(self.fit.p + one.shift), 1.0
+        for columns, sizes, own, before, then in zip(
+            self.fit.rows.columns, self._sizes, one.changed(self.theta), self.theta, after, strict=True
+        ):
+            if np.any(own):
+                left = np.sum(self._varying(columns[:, len(then)] - one.size * own) ** 2)
+                whole = np.sum(sizes[:-1] * np.square(before)) + sizes[-1]
+                out = min(out, float((left + np.sum(sizes[:-1] * np.square(then))) / max(whole, 1e-300)))
+        return out
+
+    @cached_property
+    def _sizes(self) -> list[Float]:
+        """Sums of squares of the raw columns of each row kind, theta's and then Y's, constants aside."""
+        return [
+            np.array([np.sum(self._varying(columns[:, k]) ** 2) for k in range(len(th) + 1)])
+            for columns, th in zip(self.fit.rows.columns, self.theta, strict=True)
+        ]
+
+    @cached_property
+    def _constant(self) -> Float:
+        """Raw column of a constant, of length 1 [windows, K]."""
+        rows = self.fit.rows
+        sums = rows.functions.window_sums(np.ones((1, rows.record.grid.size)))[0][rows.numbers]
+        own = sums @ rows.functions.combine(0)
+        return np.asarray(own / np.linalg.norm(own))
+
+    def _varying(self, column: Float) -> Float:
+        return np.asarray(column - np.sum(column * self._constant) * self._constant)
+
     def of(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """With their scores, that of the largest share first."""
-        work.spend(_OF_SCORE * self.residuals.size * len(candidates))
+        distinct = len({id(one.change) for one in candidates})  # courses of one column are its sums, weighted
+        work.spend(_OF_SCORE * self.residuals.size * distinct)
         out = [
             one
             for first in range(0, len(candidates), _TOGETHER)
@@ -145,22 +189,28 @@ class Scores:
         return sorted(out, key=lambda one: -one.share)
 
     @cached_property
+    def _of_windows(self) -> tuple[Float, Float]:
+        """Of each window, slopes by slopes and slopes by residuals [windows, n_p, n_p], [windows, n_p]."""
+        turned = self.slopes.transpose(0, 2, 1)
+        return turned @ self.slopes, (turned @ self.residuals[..., np.newaxis])[..., 0]
+
+    @cached_property
     def _of_parts(self) -> tuple[Float, Float, Float]:
         """Of each part, slopes by slopes, slopes by residuals, and the square of the residuals."""
-        r, slopes, parts = self.residuals, self.slopes, self._folds
-        jj = np.array([_products(slopes[own], slopes[own]) for own in parts])
-        jr = np.array([_products(slopes[own], r[own][..., np.newaxis])[:, 0] for own in parts])
-        return jj, jr, np.array([float(np.sum(r[own] ** 2)) for own in parts])
+        jj, jr = (np.array([of[own].sum(axis=0) for own in self._folds]) for of in self._of_windows)
+        return jj, jr, np.array([float(np.sum(self.residuals[own] ** 2)) for own in self._folds])
 
     def _scored(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Some of them, so few that their columns stay in the processor's cache."""
-        r, slopes, parts = self.residuals, self.slopes, self._folds
-        jj, jr, rr = self._of_parts
-        c = np.ascontiguousarray(self.white(candidates).transpose(0, 2, 1))
-        known = np.concatenate([one.known for one in self.fit.white], axis=1)
-        jc = np.array([_products(slopes[own], c[own]) for own in parts])
-        cc = np.array([np.einsum("wkc,wkc->c", c[own], c[own]) for own in parts])
-        cr = np.array([np.einsum("wkc,wk->c", c[own], r[own]) for own in parts])
+        r, (jj, jr, rr), (each_jj, each_jr) = self.residuals, self._of_parts, self._of_windows
+        columns = {id(one.change): one.change for one in candidates}
+        column = [list(columns).index(id(one.change)) for one in candidates]
+        weight = np.array([np.ones(len(r)) if one.weights is None else one.weights for one in candidates]).T
+        c = self._whitened([change(self.theta) for change in columns.values()]).transpose(0, 2, 1)
+        each_jc = (self.slopes.transpose(0, 2, 1) @ c)[:, :, column] * weight[:, np.newaxis]
+        each_cc = np.einsum("wkc,wkc->wc", c, c)[:, column] * weight**2
+        each_cr = np.einsum("wkc,wk->wc", c, r)[:, column] * weight
+        jc, cc, cr = (np.array([of[own].sum(axis=0) for own in self._folds]) for of in (each_jc, each_cc, each_cr))
 
         mix, step = self.inverse @ jc.sum(axis=0), self.inverse @ jr.sum(axis=0)
         own = cc.sum(axis=0) - np.einsum("pc,pc->c", jc.sum(axis=0), mix)
@@ -168,8 +218,9 @@ class Scores:
         real = part_of_its_own > _OWN
         own = np.where(real, own, 1.0)
         size = np.where(real, (cr.sum(axis=0) - jr.sum(axis=0) @ mix) / own, 0.0)
-        rest = c - slopes @ mix
-        moves = np.einsum("wkc,wk->wc", rest, r - slopes @ step) - size * np.einsum("wkc,wkc->wc", rest, rest)
+        squared = each_jj.reshape(len(r), -1) @ (mix[:, np.newaxis] * mix).reshape(-1, len(candidates))
+        moves = each_cr - np.einsum("wpc,p->wc", each_jc, step) - (each_jr - each_jj @ step) @ mix
+        moves -= size * (each_cc - 2 * np.einsum("wpc,pc->wc", each_jc, mix) + squared)
         error = np.sqrt(clustered_variance(moves, np.diag(1 / own)))
         shift = -self.unit[:, np.newaxis] * mix * size
 
@@ -177,18 +228,17 @@ class Scores:
         for part in range(FOLDS):
             b, mixed = jr.sum(axis=0) - jr[part], jc.sum(axis=0) - jc[part]
             others = inverse(jj.sum(axis=0) - jj[part] + self.prior, self.tangent)
-            plain, turned = others @ b, others @ mixed
-            whole = cc.sum(axis=0) - cc[part] - np.einsum("pc,pc->c", mixed, turned)
-            found = (cr.sum(axis=0) - cr[part] - b @ turned) / np.where(whole > 0, whole, np.inf)
-            p = plain[:, np.newaxis] - turned * found
+            plain, moved = others @ b, others @ mixed
+            whole = cc.sum(axis=0) - cc[part]
+            beside = whole - np.einsum("pc,pc->c", mixed, moved)
+            found = (cr.sum(axis=0) - cr[part] - b @ moved) / np.where(beside > _OWN * whole, beside, np.inf)
+            p = plain[:, np.newaxis] - moved * found
             without = rr[part] - 2 * jr[part] @ plain + plain @ jj[part] @ plain
             with_it = rr[part] - 2 * (jr[part] @ p + cr[part] * found) + np.einsum("pc,pq,qc->c", p, jj[part], p)
             with_it += 2 * found * np.einsum("pc,pc->c", jc[part], p) + found**2 * cc[part]
             gains[part], before = without - with_it, before + without
         share = gains.sum(axis=0) / max(float(before), 1e-300)
 
-        after = np.sum(known**2) - 2 * size * np.einsum("wkc,wk->c", c, known) + size**2 * cc.sum(axis=0)
-        real &= after >= _CANCELS * np.sum(known**2)
         for place, one in enumerate(candidates):
             if one.leveled:
                 real[place] &= _WHOLE[0] < size[place] < _WHOLE[1]
@@ -207,8 +257,3 @@ class Scores:
             )
             for k, one in enumerate(candidates)
         ]
-
-
-def _products(a: Float, b: Float) -> Float:
-    """Sum over windows and rows of a b^T: [windows, R, n], [windows, R, m] -> [n, m]."""
-    return np.asarray(a.reshape(-1, a.shape[-1]).T @ b.reshape(-1, b.shape[-1]))

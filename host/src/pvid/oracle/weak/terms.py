@@ -20,6 +20,7 @@ from pvid.sim.imperfections import with_play
 
 _SMOOTHED = (21, 2)  # samples and degree, for the direction of a motion that has a play
 _FORGOTTEN = 1e-18  # part of a sample behind a lag
+_NEWTON, _STEEPEST = 12, 0.1  # steps; least slope of a sensor that is not linear
 _TURNS = 2.0  # an angle that turns by less shows nothing that repeats with the turn [rad]
 
 
@@ -33,6 +34,7 @@ class Law:
     of : values at the steps from the signal and its rate [n], and w; the law is their derivative of this order
     order : see `of`; the test functions take the derivative
     width : w over the root mean square of the rate; 0: the law has none
+    part : w over the largest magnitude of the signal; 0: the law has none
     angle : of angles that turn alone
     signs : of signals that change their sign alone
     """
@@ -41,6 +43,7 @@ class Law:
     of: Callable[[Float, Float, float], Float]
     order: int = 0
     width: float = 0.0
+    part: float = 0.0
     angle: bool = False
     signs: bool = False
 
@@ -60,6 +63,8 @@ def _stribeck(x: Float, v: Float, w: float) -> Float:
 
 _STRIBECK = "sgn({x}.d())/(1 + ({x}.d()/{w})**2)"
 
+_STOP = "({x} + (abs({x} - {w}) - abs({x} + {w}))/2)"
+
 CONSTANT = Law("1", lambda x, v, w: np.ones(x.shape))
 COSINE = Law("cos({x})", lambda x, v, w: np.cos(x), angle=True)
 LAWS = (
@@ -76,6 +81,7 @@ LAWS = (
     Law("sgn({x}.d())", lambda x, v, w: _sign(v)),
     Law("abs({x}.d())", lambda x, v, w: np.abs(v)),
     *(Law(_STRIBECK, _stribeck, width=width) for width in (0.03, 0.1, 0.3)),
+    *(Law(_STOP, lambda x, v, w: x - np.clip(x, -w, w), part=part) for part in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)),
     Law("{x}.d(2)", lambda x, v, w: x, order=2),
     Law("sin({x})", lambda x, v, w: np.sin(x), angle=True),
     COSINE,
@@ -182,6 +188,15 @@ def _play(of: Recorded, _: float) -> Float:
     return np.asarray((smooth - with_play(smooth, width)) / width)
 
 
+def _without_cubic(of: Recorded, level: float) -> Float:
+    """True values, of which those recorded are x (1 - level (x/top)^2)."""
+    relative = of.values / of.top
+    x = relative.copy()
+    for _ in range(_NEWTON):
+        x = x - (x - level * x**3 - relative) / np.maximum(1 - 3 * level * x**2, _STEEPEST)
+    return np.asarray(of.top * x)
+
+
 def _parts(*parts: float) -> Callable[[Recorded], tuple[float, ...]]:
     """Of the largest magnitude."""
     return lambda of: tuple(one * of.top for one in parts)
@@ -246,6 +261,15 @@ GAIN = Act(
     typed="{u}*(1 + {a})",
 )
 
+OFFSET = Act(
+    "has an offset of {word}{size}",
+    lambda of, _: np.full(len(of.values), -1.0),
+    "signal",
+    ("", "-"),
+    most=lambda of: of.top,
+    applies=_is_measured,
+)
+
 _DELAY = Act(
     "is {word} by {size}",
     _shifted,
@@ -262,6 +286,16 @@ _LATE = Act(
     ("early", "late"),
     levels=_samples(-1, -2, -4, -8, -16),
     applies=_is_input,
+)
+_SHOWS = Act(
+    "shows {u}*(1 {word} {size}*({u}/{top})**2)",
+    _without_cubic,
+    "part",
+    ("-", "+"),
+    levels=lambda _: (),
+    most=lambda _: 0.9,
+    applies=_is_measured,
+    typed="{u} + {a}*{u}**3",
 )
 UNUSUAL, UNUSUAL_LAWS = ("advanced", "early"), (COSINE,)
 
@@ -329,14 +363,7 @@ ACTS = (
         typed="{u} + {a}*({u} - abs({u}))/2",
     ),
     GAIN,
-    Act(
-        "has an offset of {word}{size}",
-        lambda of, _: np.full(len(of.values), -1.0),
-        "signal",
-        ("", "-"),
-        most=lambda of: of.top,
-        applies=_is_measured,
-    ),
+    OFFSET,
     Act("has a backlash of {size}", _play, "signal", most=_resolutions, applies=_is_stepped),
     *(
         Act(
@@ -348,16 +375,34 @@ ACTS = (
         )
         for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)
     ),
-    Act(
-        "shows {u}*(1 {word} {size}*({u}/{top})**2)",
-        lambda of, _: of.values**3 / of.top**2,
-        "part",
-        ("-", "+"),
-        most=lambda _: 0.5,
-        applies=_is_measured,
-        typed="{u} + {a}*{u}**3",
-    ),
+    replace(_SHOWS, of=lambda of, _: of.values**3 / of.top**2, levels=None, exact=_SHOWS),
 )
+
+
+@dataclass(frozen=True)
+class Course:
+    """What changes during a run.
+
+    Attributes
+    ----------
+    text : in a sentence; {name} of a parameter, a signal or an equation, {size} the change with its unit
+    measure : of the size
+    """
+
+    text: str
+    measure: Literal["parameter", "signal", "percent", "equation"]
+
+
+OF_PARAMETER = Course("{name} changes by {size}", "parameter")
+OF_GAIN = Course("the gain of {name} changes by {size}", "percent")
+OF_OFFSET = Course("the offset of {name} changes by {size}", "signal")
+OF_LOAD = Course("the load of {name} changes by {size}", "equation")
+# Gradually: steadily, or ever more slowly; of the part of the run that is over. Else at once, at these parts of it.
+GRADUAL: tuple[Callable[[Float], Float], ...] = (
+    lambda part: part,
+    lambda part: np.asarray((1 - np.exp(-4 * part)) / (1 - np.exp(-4.0))),
+)
+JUMPS = tuple(0.05 * k for k in range(2, 19))
 
 
 # What a sign that switches at once is in place of: tanh(v/level), of the argument's root mean square.
@@ -377,11 +422,13 @@ class Candidate:
     ----------
     where : name of the row of a law; otherwise of the signal
     signal : name of the signal; "" of a constant
-    kind : the law or act
-    level : of an act that has levels; of a law its width [unit of the rate]
-    change : see Change
-    top : of an act, largest magnitude of the signal as recorded
+    kind : the law, act or course
+    level : of an act that has levels; of a law its width [unit of the rate]; of a course when it jumps [s], 0: it does
+        not
+    change : see Change; of a course as if it was there all the time
+    top : of an act, largest magnitude of the signal as recorded; of a course, the change for size 1
     most : largest believable size
+    weights : of a course, how far it is there in each window [windows]; None: all the time
     size : estimate
     certainty : |size| over its standard error
     own : part of the column's square that no change of p explains
@@ -392,17 +439,23 @@ class Candidate:
 
     where: str
     signal: str
-    kind: Law | Act
+    kind: Law | Act | Course
     level: float
     change: Change
     top: float = 0.0
     most: float = np.inf
+    weights: Float | None = None
     size: float = 0.0
     certainty: float = 0.0
     own: float = 0.0
     share: float = 0.0
     folds: int = 0
     shift: Float = field(default_factory=lambda: np.zeros(0))
+
+    def changed(self, theta: Sequence[Float]) -> list[Float]:
+        """The change of the raw residuals of each kind [windows, K] for size 1."""
+        out = self.change(theta)
+        return out if self.weights is None else [own * self.weights[:, np.newaxis] for own in out]
 
     @property
     def family(self) -> tuple[str, str, str]:
