@@ -220,8 +220,4 @@ PVID_COLD bool pvid_constraints_return_f32(const pvid_model_f32 *model, const pv
     return ties.off <= MET;
 }
 
-#else
-
-typedef int pvid_constraints_are_left_out; /* no translation unit is empty */
-
 #endif

@@ -75,8 +75,4 @@ PVID_COLD void pvid_drift_forget_f32(pvid_estimator_f32 *self)
     }
 }
 
-#else
-
-typedef int pvid_drifts_are_left_out; /* no translation unit is empty */
-
 #endif
