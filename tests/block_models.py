@@ -215,51 +215,22 @@ class EstimatorInC:
         return {name: int(getattr(counters, name)) for name, _ in self.ffi.typeof(counters).fields}
 
 
-class EstimatorQ31InC:
-    """pvid_estimator_q31 on a block model."""
+class Q31InC:
+    """pvid_estimator_q31 on the model that a pointer points to."""
 
-    def __init__(self, native: Native, model: BlockModelQ31, config: EstimatorConfigQ31) -> None:
+    def __init__(self, native: Native, model: Any, config: EstimatorConfigQ31) -> None:
         ffi = native.headers.ffi
         self.native, self.ffi, self.library = native, ffi, native.library
-        real = model.real
-
-        def filled(function: Any) -> Any:
-            def call(p: Any, out: Any) -> None:
-                for i, value in enumerate(function(np.array([p[a] for a in range(real.n_p)], np.int64))):
-                    out[i] = int(value)
-
-            return ffi.callback("void(*)(const int32_t *, int64_t *)", call)
-
-        def formats(p_bits: Any, theta_bits: Any, c_bits: Any) -> None:
-            theta, c = model.formats([p_bits[a] for a in range(real.n_p)])
-            for i, bits in enumerate(theta):
-                theta_bits[i] = bits
-            for k, bits in enumerate(c):
-                c_bits[k] = bits
-
-        columns, rows = zip(*real.non_zeros, strict=True)
-        several = len(real.kind_end) > 1
-        self._owned = [
-            ffi.new("uint8_t[]", list(rows)),
-            ffi.new("uint8_t[]", list(columns)),
-            ffi.new("uint8_t[]", list(real.kind_end)),
-            filled(model.theta),
-            filled(model.jacobian),
-            ffi.callback("void(*)(const int8_t *, int16_t *, int16_t *)", formats),
-        ]
-        self.model = ffi.new("pvid_model_q31 *")
-        self.model.n_theta, self.model.n_p, self.model.n_c = real.n_theta, real.n_p, len(rows)
-        self.model.positive = 2**real.n_p - 1
-        self.model.n_kinds = len(real.kind_end) if several else 0
-        row, column, kind_end, self.model.theta, self.model.jacobian, self.model.formats = self._owned
-        self.model.c_row, self.model.c_column = row, column
-        self.model.kind_end = kind_end if several else ffi.NULL
-        self.n_p = int(self.model.n_p)
+        self.n_p = int(model.n_p)
         self._filled = native.headers.filled("pvid_estimator_config_q31", config)
-        self._filled.struct.model = self.model
+        self._filled.struct.model = model
         self.state = ffi.new("pvid_estimator_q31 *")
-        layout, settings = self.library.pvid_layout(), ffi.addressof(self._filled.struct)
-        assert self.library.pvid_estimator_init_layout_q31(self.state, settings, layout) == 0
+        assert (
+            self.library.pvid_estimator_init_layout_q31(
+                self.state, ffi.addressof(self._filled.struct), self.library.pvid_layout()
+            )
+            == 0
+        )
 
     def add(self, kind: int, n: Int, y: int) -> int:
         """Adds a row of a kind; returns the reason."""
@@ -301,3 +272,44 @@ class EstimatorQ31InC:
         """By name."""
         counters = self.state.counters
         return {name: int(getattr(counters, name)) for name, _ in self.ffi.typeof(counters).fields}
+
+
+class EstimatorQ31InC(Q31InC):
+    """pvid_estimator_q31 on a block model."""
+
+    def __init__(self, native: Native, model: BlockModelQ31, config: EstimatorConfigQ31) -> None:
+        ffi = native.headers.ffi
+        real = model.real
+
+        def filled(function: Any) -> Any:
+            def call(p: Any, out: Any) -> None:
+                for i, value in enumerate(function(np.array([p[a] for a in range(real.n_p)], np.int64))):
+                    out[i] = int(value)
+
+            return ffi.callback("void(*)(const int32_t *, int64_t *)", call)
+
+        def formats(p_bits: Any, theta_bits: Any, c_bits: Any) -> None:
+            theta, c = model.formats([p_bits[a] for a in range(real.n_p)])
+            for i, bits in enumerate(theta):
+                theta_bits[i] = bits
+            for k, bits in enumerate(c):
+                c_bits[k] = bits
+
+        columns, rows = zip(*real.non_zeros, strict=True)
+        several = len(real.kind_end) > 1
+        self._owned = [
+            ffi.new("uint8_t[]", list(rows)),
+            ffi.new("uint8_t[]", list(columns)),
+            ffi.new("uint8_t[]", list(real.kind_end)),
+            filled(model.theta),
+            filled(model.jacobian),
+            ffi.callback("void(*)(const int8_t *, int16_t *, int16_t *)", formats),
+        ]
+        self.model = ffi.new("pvid_model_q31 *")
+        self.model.n_theta, self.model.n_p, self.model.n_c = real.n_theta, real.n_p, len(rows)
+        self.model.positive = 2**real.n_p - 1
+        self.model.n_kinds = len(real.kind_end) if several else 0
+        row, column, kind_end, self.model.theta, self.model.jacobian, self.model.formats = self._owned
+        self.model.c_row, self.model.c_column = row, column
+        self.model.kind_end = kind_end if several else ffi.NULL
+        super().__init__(native, self.model, config)

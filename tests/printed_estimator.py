@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from block_models import BlockModel, BlockModelQ31
+from struct_fields import numbers_of
 
 from pvid.core.native import Native
 from pvid.core.sources import FOLDERS, sources_of
@@ -131,7 +132,7 @@ class PrintedEstimator:
         kind = f"pvid_estimate_{self._core}"
         own, out = getattr(self._module, kind)(), np.zeros((), self._native.headers.dtype(kind))
         self._called("assess", own)
-        for name in out.dtype.names or ():
+        for name in numbers_of(out):
             out[name] = np.reshape(getattr(own, name), out[name].shape)
         return out
 

@@ -14,3 +14,8 @@ def set_field(struct: Any, path: str, value: Any) -> None:
         struct[int(last)] = value
     else:
         setattr(struct, last, value)
+
+
+def numbers_of(struct: Any) -> list[str]:
+    """Names of the fields of a record of numpy that hold numbers: no structs of their own."""
+    return [name for name in struct.dtype.names or () if struct.dtype[name].names is None]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from struct_fields import numbers_of
 
 from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native
@@ -82,14 +83,14 @@ def in_pieces(core: WeakIdentifier | PrintedTwin, samples: Float32, frozen: Mask
     for first, last in zip(edges, edges[1:], strict=False):
         core.freeze(bool(frozen[first]))
         parts.append((core.run if isinstance(core, PrintedTwin) else core.run_samples)(samples[first:last]))
-    names = ("p", "sums", "reason", "published", "published_se", "hash")
+    names = ("p", "sums", "reason", "published", "published_se", "standing", "hash")
     joined = {name: np.concatenate([getattr(one, name) for one in parts]) for name in names}
     return Record(**joined)
 
 
 def assert_same(core: Record, twin: Record) -> None:
     """Asserts that both have the same bits after every tick."""
-    for part in ("reason", "p", "sums", "exponent", "published", "published_se", "hash"):
+    for part in ("reason", "p", "sums", "exponent", "published", "published_se", "standing", "hash"):
         own, other = getattr(core, part), getattr(twin, part)
         assert own.dtype == other.dtype and own.shape == other.shape, part
         if own.tobytes() != other.tobytes():
@@ -130,7 +131,7 @@ def assert_equals_the_twin(
         assert_same(record, twin.run(samples) if frozen is None else in_pieces(twin, samples, frozen))
         assert core.running_hash == twin.running_hash
         assert core.counters == twin.counters and core.is_published == twin.is_published
-        for name in core.estimate.dtype.names or ():
+        for name in numbers_of(core.estimate):
             other = np.array(getattr(twin.estimate, name), np.float32)
             assert core.estimate[name].tobytes() == other.tobytes(), name
         assert np.isfinite(record.p).all() and np.isfinite(record.sums).all()

@@ -32,6 +32,8 @@ ENUMS = {
     "Reason": ("pvid_reason", "Outcome of a tick"),
     "Status": ("pvid_status", "Analysis of an init"),
     "Stage": ("pvid_stage", "Whose estimate is published"),
+    "Standing": ("pvid_standing_state", "Whether a published estimate still holds"),
+    "Doubt": ("pvid_doubt", "Why it is doubted or withdrawn, one bit each"),
     "Law": ("pvid_law", "How the estimate follows the data"),
     "SnapshotStatus": ("pvid_snapshot_status", "Analysis of a snapshot's restore"),
 }

@@ -199,7 +199,7 @@ PROOFS = (
         "trust_q31",
         "any configuration, four parameters and three; any group on top of any state that a group leaves",
         (
-            *("src/judge/trust_q31.c", "src/judge/publication.c"),
+            *("src/judge/trust_q31.c", "src/judge/standing.c", "src/judge/publication.c"),
             "src/number/integer_q31.c",
         ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),

@@ -5,7 +5,7 @@
 #define PVID_LINK_VERSION 1u
 
 /* CRC-32 of the text. */
-#define PVID_LINK_SCHEMA 0xBDEE6285u
+#define PVID_LINK_SCHEMA 0x73E49A2Au
 
 #define PVID_LINK_SCHEMA_TEXT \
     "pvid 1\n" \
@@ -14,14 +14,14 @@
     "3 configure session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 law:u8 start:f32[8] start_sd:f32[8] lower:f32[8] upper:f32[8] row_sd:f32 forgetting_s:f32 feedback_hz:f32 first_tick:u64\n" \
     "4 sample data:f32[]\n" \
     "5 raw session:u32 tick_high:u16 samples:u8 data:f32[]\n" \
-    "6 estimate session:u32 updates:u32 p:f32[8] covariance:f32[36] kappa:f32 residual_sd:f32 weight:f32 reason:u8 tick_high:u16\n" \
+    "6 estimate session:u32 updates:u32 p:f32[8] covariance:f32[36] kappa:f32 residual_sd:f32 weight:f32 reason:u8 tick_high:u16 standing:u32\n" \
     "7 status session:u32 code:u8 core:u8 updates:u32 rejected:u32 repeated:u32 skipped:u32 missing:u32 malformed:u32 bad_crc:u32 foreign:u32 tick_high:u16\n" \
     "8 hash session:u32 hash:u32 tick_high:u16 sample_hash:u32\n" \
     "9 credit session:u32 room:u32 hash:u32 reason:u8 tick_high:u16 sample_hash:u32\n" \
     "10 configure_q31 session:u32 settings:u32 form:u8 source:u8 hash_every:u16 estimate_every:u16 divider:u16 start:i32[8] start_sd:i32[8] lower:i32[8] upper:i32[8] row_sd:i32 forgetting_groups:u32 gain:i32 phi_offset:i32 y_offset:i32 first_tick:u64\n" \
     "11 count data:i32[]\n" \
     "12 raw_count session:u32 tick_high:u16 samples:u8 data:i32[]\n" \
-    "13 estimate_q31 session:u32 updates:u32 p:i32[8] se:i32[8] correlation:i32[36] kappa:i32 residual_sd:i32 weight:u32 reason:u8 tick_high:u16\n" \
+    "13 estimate_q31 session:u32 updates:u32 p:i32[8] se:i32[8] correlation:i32[36] kappa:i32 residual_sd:i32 weight:u32 reason:u8 tick_high:u16 standing:u32\n" \
     "14 names text:char[]\n" \
     "15 refined_estimate session:u32 number:u32 p:f32[8] covariance:f32[36] r:f32[8] se:f32[8] level:f32 clash:f32 reason:u8 stage:u8 tick_high:u16"
 
@@ -87,7 +87,8 @@
 #define PVID_ESTIMATE_WEIGHT 192u /* f32 */
 #define PVID_ESTIMATE_REASON 196u /* u8 */
 #define PVID_ESTIMATE_TICK_HIGH 197u /* u16 */
-#define PVID_ESTIMATE_BYTES 199u
+#define PVID_ESTIMATE_STANDING 199u /* u32 */
+#define PVID_ESTIMATE_BYTES 203u
 
 #define PVID_STATUS 7u
 #define PVID_STATUS_SESSION 0u /* u32 */
@@ -162,7 +163,8 @@
 #define PVID_ESTIMATE_Q31_WEIGHT 224u /* u32 */
 #define PVID_ESTIMATE_Q31_REASON 228u /* u8 */
 #define PVID_ESTIMATE_Q31_TICK_HIGH 229u /* u16 */
-#define PVID_ESTIMATE_Q31_BYTES 231u
+#define PVID_ESTIMATE_Q31_STANDING 231u /* u32 */
+#define PVID_ESTIMATE_Q31_BYTES 235u
 
 #define PVID_NAMES 14u
 #define PVID_NAMES_TEXT 0u /* char[] */

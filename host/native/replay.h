@@ -11,6 +11,7 @@ typedef struct {
     float *p;                    /* [ticks][n_p] */
     float *published;            /* [ticks][n_p] of the weak form */
     float *published_se;         /* likewise: its standard errors */
+    uint32_t *standing;          /* [ticks] of it: age + 2^16 state + 2^24 causes */
     float *sums;                 /* [ticks][n_moments + n_theta + 2] */
     uint8_t *reason;             /* [ticks] */
     uint32_t *hash;              /* [ticks] running hash after the tick */

@@ -16,6 +16,7 @@ typedef struct {
     uint32_t *running_hash;      /* in and out; needed with hash */
     int32_t *published;          /* [ticks][n_p] of the weak form */
     int32_t *published_se;       /* likewise: its standard errors */
+    uint32_t *standing;          /* [ticks] of it, as in replay.h */
     pvid_estimate_q31 *estimate; /* [ticks / estimate_every, rounded up]; the published one in the weak form */
     uint32_t estimate_every;
 } pvid_record_q31;

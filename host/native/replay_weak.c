@@ -17,6 +17,7 @@ void pvid_replay_weak_f32(pvid_weak_f32 *self, uint32_t ticks, const float sampl
             const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(self);
             memcpy(&record->published[(size_t)tick * n_p], estimate->p, n_p * sizeof(float));
             memcpy(&record->published_se[(size_t)tick * n_p], estimate->se, n_p * sizeof(float));
+            record->standing[tick] = pvid_standing_word(estimate->standing);
         }
     }
 }

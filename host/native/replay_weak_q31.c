@@ -17,6 +17,7 @@ void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t rea
             const pvid_estimate_q31 *estimate = pvid_weak_estimate_q31(self);
             memcpy(&record->published[(size_t)tick * n_p], estimate->p, n_p * sizeof estimate->p[0]);
             memcpy(&record->published_se[(size_t)tick * n_p], estimate->se, n_p * sizeof estimate->se[0]);
+            record->standing[tick] = pvid_standing_word(estimate->standing);
         }
     }
 }

@@ -112,7 +112,7 @@ def test_the_answer_is_a_table_with_the_reason_of_the_last_window(recorded: dict
     answer = pvid("identify", recorded["rigid_body"], "--core", "f32")
     assert answer.return_value == DONE
     assert "weak form, C in float32" in answer.stdout and "Ixx [kg*m^2]" in answer.stdout
-    assert "last window: updated; chi2 " in answer.stdout
+    assert "last window: updated; valid; chi2 " in answer.stdout
 
 
 def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(core: CoreAnswer) -> None:

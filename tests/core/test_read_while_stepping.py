@@ -23,6 +23,7 @@ def play_threads(folder: Path, *options: str) -> subprocess.CompletedProcess[str
     command = ["clang", "-std=c99", "-O1", "-g", "-fsanitize=thread", *options, *INCLUDES, str(PROGRAM)]
     command += [
         str(source("publication.c")),
+        str(source("standing.c")),
         str(source("kinds.c")),
         str(source("fnv.c")),
         *map(str, sources),

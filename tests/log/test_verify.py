@@ -86,6 +86,7 @@ def _wrong_in(name: str, place: int) -> Callable[[link.Estimate], link.Estimate]
         (lambda message: replace(message, residual_sd=_flipped(message.residual_sd)), "residual sd"),
         (lambda message: replace(message, weight=_flipped(message.weight)), "weight"),
         (lambda message: replace(message, updates=message.updates + 1), "updates"),
+        (lambda message: replace(message, standing=message.standing ^ 1), "standing"),
         (lambda message: replace(message, reason=message.reason ^ 1), "status"),
     ],
 )

@@ -4,6 +4,7 @@
 
 #include "contracts.h"
 
+#include "judge/standing.h"
 #include "pvid/trust_q31.h"
 
 #define VARIANCE_RATIO_MAX (1000000LL << PVID_VARIANCE_RATIO_BITS)
@@ -41,6 +42,19 @@ static void any_estimate(const pvid_model_q31 *model, pvid_estimate_q31 *estimat
     estimate->misfit = any_i32(0, INT32_MAX);
 }
 
+/* As any windows leave it. */
+static void any_standing(pvid_standing_judge *judge)
+{
+    Frama_C_make_unknown((char *)judge, sizeof *judge);
+    judge->fits = (uint8_t)any_u32(0, 32);
+    judge->fit = any_u32(0, PVID_STANDING_CLIP);
+    judge->contradicts = any_bool();
+    judge->grew = any_bool();
+    judge->misfit = any_bool();
+    judge->rejects = any_bool();
+    judge->opened = any_bool();
+}
+
 /* A verdict after none, or some, that had a residual. */
 static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most)
 {
@@ -67,7 +81,9 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
         trust.recent[i] = any_i64(-VARIANCE_RATIO_MAX, VARIANCE_RATIO_MAX);
     }
+    any_standing(&trust.standing);
     for (size_t a = 0; a < PVID_MAX_P; a++) {
+        trust.trusted[a] = any_i32(-INT32_MAX, INT32_MAX);
         trust.anchor[a] = any_i32(-INT32_MAX, INT32_MAX);
     }
     trust.anew = any_bool();
@@ -76,7 +92,11 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     /*@ assert 0 <= fading; */
     any_estimate(model, &candidate);
     (void)pvid_trust_judge_q31(&trust, &estimator, (pvid_reason)any_i32(PVID_UPDATED, PVID_HELD_FROZEN),
-                               any_i64(0, (int64_t)1 << 62), any_bool(), any_i64(-INT64_MAX, INT64_MAX), &candidate);
+                               any_i64(0, (int64_t)1 << 62), any_bool(), any_i64(-INT64_MAX, INT64_MAX),
+                               (uint16_t)any_u32(1, UINT16_MAX), &candidate);
+    int32_t p[PVID_MAX_P];
+    pvid_trust_skip_q31(&trust, any_bool());
+    (void)pvid_trust_start_q31(&trust, &estimator, PVID_UPDATED, p);
     /*@ assert -VARIANCE_RATIO_MAX <= trust.long_mean <= VARIANCE_RATIO_MAX; */
     /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] >= -VARIANCE_RATIO_MAX; */
     /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] <= VARIANCE_RATIO_MAX; */

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
+from struct_fields import numbers_of
 from weak_rig import WeakRig, weak_rig
 
 from pvid.base.errors import PvidError
@@ -109,7 +110,7 @@ def test_the_twin_of_both_stages_publishes_what_the_core_does() -> None:
         (own_stage, own), (stage, estimate) = core.best, twin.best
         assert own_stage == stage, k
         stages.append(stage)
-        for name in own.dtype.names or ():
+        for name in numbers_of(own):
             assert own[name].tobytes() == np.array(getattr(estimate, name), np.float32).tobytes(), name
     assert len(np.flatnonzero(np.diff(stages))) >= 3
 

@@ -94,7 +94,8 @@ static an_estimate fitted(an_estimate estimate, double misfit, int rows)
 
 static pvid_reason judge(pvid_reason solved, double size, bool above_noise, double variance_ratio, an_estimate estimate)
 {
-    return pvid_trust_judge_f32(&trust, &estimator, solved, (float)size, above_noise, (float)variance_ratio, &estimate);
+    return pvid_trust_judge_f32(&trust, &estimator, solved, (float)size, above_noise, (float)variance_ratio, 20,
+                                &estimate);
 }
 
 static void place(double p)

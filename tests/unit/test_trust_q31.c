@@ -86,7 +86,7 @@ static an_estimate fitted(an_estimate estimate, double misfit, int rows)
 static pvid_reason judge(pvid_reason solved, double size, bool above_noise, double variance_ratio, an_estimate estimate)
 {
     return pvid_trust_judge_q31(&trust, &estimator, solved, (int64_t)(size * 4194304.0), above_noise,
-                                q24(variance_ratio), &estimate);
+                                q24(variance_ratio), 20, &estimate);
 }
 
 static void place(double p)
@@ -131,7 +131,7 @@ static void huge_variance_ratio_is_clamped(void **state)
     (void)state;
     for (int i = 0; i < 4; i++) {
         an_estimate fine = candidate(0.01, 1.0e-2);
-        (void)pvid_trust_judge_q31(&trust, &estimator, PVID_UPDATED, 0, true, (int64_t)1 << 62, &fine);
+        (void)pvid_trust_judge_q31(&trust, &estimator, PVID_UPDATED, 0, true, (int64_t)1 << 62, 20, &fine);
     }
     assert_int_equal(trust.recent[0], q24(1.0e6));
     assert_int_equal(trust.long_mean, q24(1.0e6));

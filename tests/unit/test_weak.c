@@ -658,6 +658,43 @@ static void outliers_are_rejected_by_the_gate(void **state)
     }
 }
 
+/* The sensor shows 0.6 times as much from one tick on, as with another a, c and d. The gate rejects, then opens: the
+ * estimate is withdrawn, and p starts at the trusted one, until the new one is known. */
+static void a_changed_mechanism_withdraws_until_it_is_known_anew(void **state)
+{
+    (void)state;
+    pvid_weak_design_f32 design;
+    pvid_weak_config_f32 config;
+    uint32_t reasons[16];
+    start(&design, &config);
+    config.gate.sigmas = 4.0f;
+    config.gate.patience_s = (float)(10.0 * HOP / RATE);
+    assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+    first_order rig = {.generator = 12u};
+    (void)run(&rig, 40 * HOP, reasons);
+    assert_int_equal(self.trust.estimate.standing.state, PVID_STANDING_VALID);
+    bool opened = false;
+    bool doubted = false;
+    for (int tick = 0; tick < 80 * HOP; tick++) {
+        float sample[2];
+        next_sample(&rig, sample);
+        sample[1] *= 0.6f;
+        (void)pvid_weak_step_f32(&self, sample);
+        const pvid_standing *standing = &self.trust.estimate.standing;
+        doubted = doubted || (standing->causes == PVID_DOUBT_REJECTS);
+        if (!opened && (standing->state == PVID_STANDING_WITHDRAWN)) {
+            opened = true;
+            assert_int_equal(standing->causes, PVID_DOUBT_CHANGED);
+            assert_memory_equal(self.estimator.p, self.trust.trusted, sizeof self.trust.trusted);
+            assert_float_equal(self.estimator.p[0], truth[0], 0.1);
+            assert_true(self.estimator.information.high[0] + self.estimator.information.low[0] < 1.0e-30f);
+        }
+    }
+    assert_true(doubted && opened);
+    assert_int_equal(self.trust.estimate.standing.state, PVID_STANDING_VALID);
+    assert_float_equal(self.trust.estimate.p[0], 0.6 * truth[0], 0.1);
+}
+
 /* ---- init ---- */
 
 static void init_names_what_is_out_of_range(void **state)
@@ -806,6 +843,7 @@ int main(void)
         cmocka_unit_test(a_half_without_motion_drops_both_windows_that_it_is_in),
         cmocka_unit_test(a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_in),
         cmocka_unit_test(outliers_are_rejected_by_the_gate),
+        cmocka_unit_test(a_changed_mechanism_withdraws_until_it_is_known_anew),
         cmocka_unit_test(init_names_what_is_out_of_range),
         cmocka_unit_test(an_object_before_its_init_does_nothing),
         cmocka_unit_test(without_a_second_stage_there_is_no_snapshot_of_one),

@@ -34,6 +34,7 @@ from pvid.link.frames import (
 from pvid.log.mechanism import LogMechanism
 from pvid.log.rig import mechanism_in
 from pvid.rig.mechanism_file import MechanismRig
+from pvid.settings.record import standing_word
 from pvid.twin import fnv
 
 SESSION = 7
@@ -110,6 +111,8 @@ def estimate_of(own: Any, frame: type[Kind], **values: Any) -> Kind:
     values |= {name: padded(own[name]) for name in names & {"p", "se"}}
     values |= {name: link.upper_triangle(own[name]) for name in names & {"covariance", "correlation"}}
     values |= {name: own[name].item() for name in ("kappa", "residual_sd", "weight")}
+    standing = own["standing"]
+    values["standing"] = standing if isinstance(standing, int) else standing_word(standing)
     return frame(**values)
 
 

@@ -60,6 +60,7 @@ static inline void put_estimate(uint8_t payload[PVID_ESTIMATE_BYTES], const pvid
     pvid_put_f32(&payload[PVID_ESTIMATE_RESIDUAL_SD], estimate->residual_sd);
     pvid_put_f32(&payload[PVID_ESTIMATE_WEIGHT], estimate->weight);
     payload[PVID_ESTIMATE_REASON] = (uint8_t)reason;
+    pvid_put_u32(&payload[PVID_ESTIMATE_STANDING], pvid_standing_word(estimate->standing));
 }
 
 #endif

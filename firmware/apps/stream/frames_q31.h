@@ -51,6 +51,7 @@ static inline void put_estimate(uint8_t payload[PVID_ESTIMATE_Q31_BYTES], const 
     pvid_put_i32(&payload[PVID_ESTIMATE_Q31_RESIDUAL_SD], estimate->residual_sd);
     pvid_put_u32(&payload[PVID_ESTIMATE_Q31_WEIGHT], estimate->weight);
     payload[PVID_ESTIMATE_Q31_REASON] = (uint8_t)reason;
+    pvid_put_u32(&payload[PVID_ESTIMATE_Q31_STANDING], pvid_standing_word(estimate->standing));
 }
 
 #endif

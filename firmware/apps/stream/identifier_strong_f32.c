@@ -35,7 +35,9 @@ void identifier_estimate(uint8_t payload[PVID_ESTIMATE_BYTES], uint32_t session,
 {
     pvid_estimate_f32 estimate;
     STREAM_NAME(assess)(&identifier, &estimate);
+    estimate.standing = (pvid_standing){0, 0, 0};
     put_estimate(payload, &estimate, session, identifier.estimator.counters.updates, reason);
+    pvid_put_u32(&payload[PVID_ESTIMATE_STANDING], UINT32_MAX); /* the strong form has none */
 }
 
 const pvid_counters *identifier_counters(void)

@@ -42,6 +42,7 @@
 #include "pvid/information.h"
 #include "pvid/layout.h"
 #include "pvid/model.h"
+#include "pvid/standing.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus
@@ -90,6 +91,7 @@ typedef struct {
     float residual_sd; /* of Y - N^T theta [units of Y], not below the sensors' noise; basis of the standard errors */
     float weight;      /* rows in the sums, after forgetting */
     float misfit;      /* residual variance of all rows in the sums over its expectation; 0: unknown */
+    pvid_standing standing; /* of the published one */
 } pvid_estimate_f32;
 
 /* The init below, for an application with this word (layout.h). */

@@ -19,6 +19,7 @@
 #include "pvid/config.h"
 #include "pvid/layout.h"
 #include "pvid/model_q31.h"
+#include "pvid/standing.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus
@@ -64,9 +65,10 @@ typedef struct {
     int32_t correlation[PVID_MAX_P][PVID_MAX_P]; /* of the errors, Q30: covariance_ab = se_a se_b correlation_ab */
     int32_t kappa;                               /* Q30, 0..1: see estimator.h */
     int32_t least_pivot;                         /* likewise */
-    int32_t residual_sd; /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1: see estimator.h */
-    uint32_t weight;     /* rows in the sums, after forgetting */
-    int32_t misfit;      /* Q16, at most 2^31 - 1: see estimator.h; 0: unknown */
+    int32_t residual_sd;    /* of Y - N^T theta [2^-8 units of Y's integer], at most 2^31 - 1: see estimator.h */
+    uint32_t weight;        /* rows in the sums, after forgetting */
+    int32_t misfit;         /* Q16, at most 2^31 - 1: see estimator.h; 0: unknown */
+    pvid_standing standing; /* of the published one */
 } pvid_estimate_q31;
 
 /* The init below, for an application with this word (layout.h). */

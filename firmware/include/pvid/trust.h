@@ -19,12 +19,16 @@
  * digits when p moves far. When p has converged far from its value at those rows, the old sums are faded over the next
  * groups.
  *
- * Beginning anew. When the gate opens to a changed mechanism, almost nothing of the old sums remains. p stays. The
- * published estimate is held until p passes the checks of a first publication.
+ * Beginning anew. When an equation's own error turns out to be larger, almost nothing of the old sums remains. p stays.
+ * The published estimate is held until p passes the checks of a first publication.
  *
  * Neglected terms. Residuals do not show a small error of the equations, and more data do not reduce the error of p
  * that it causes. `neglected` is therefore added to the published standard errors, the same share of each positive
  * parameter. Whether an estimate is published does not depend on it.
+ *
+ * Standing. Behind every window the published estimate is compared with the candidate, and may be doubted or withdrawn:
+ * standing.h. When the gate opens, or when several windows lead to no publication although p does not fit them, p
+ * starts again: from the last trusted p, then from points about it, with sums of zero.
  *
  * Every input is allowed. Cost: O(n_p^2).
  */
@@ -76,9 +80,18 @@ void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
 /* Renews the sums and restarts the alarm; call it when the rows change their meaning. */
 void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
-/* The mechanism has changed: the sums and the alarm begin anew with the next group, and the estimate must pass the
- * checks again. */
+/* The sums and the alarm begin anew with the next group, and the estimate must pass the checks again. */
 void pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
+
+/* The gate opens to a changed mechanism in this group. */
+void pvid_trust_open_f32(pvid_trust_f32 *self);
+
+/* A group without rows: all of them were rejected by the gate, or the group was dropped. */
+void pvid_trust_skip_f32(pvid_trust_f32 *self, bool rejected);
+
+/* Behind a group: writes p [n_p] of the next start and returns true if p has to start again. */
+bool pvid_trust_start_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
+                          float p[PVID_MAX_P]);
 
 /* Factor on the sums before the rows of the next group are added; 1: no renewal, or too little would remain. Call
  * it once per group. */
@@ -94,10 +107,12 @@ const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self);
  *   reason, size:    of that solve
  *   above_noise:     of the assessment
  *   variance_ratio:  residual variance of the group over its expectation
+ *   freedom:         rows of the group less nuisances
  *   candidate:       the assessed estimate; the published copy also contains the neglected terms
  * Returns a reason of the table above and counts it. */
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
-                                 bool above_noise, float variance_ratio, pvid_estimate_f32 *candidate);
+                                 bool above_noise, float variance_ratio, uint16_t freedom,
+                                 pvid_estimate_f32 *candidate);
 
 #ifdef __cplusplus
 }

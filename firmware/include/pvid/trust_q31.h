@@ -47,6 +47,12 @@ void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estima
 /* pvid_trust_begin_anew_f32. */
 void pvid_trust_begin_anew_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator);
 
+/* As those of trust.h. */
+void pvid_trust_open_q31(pvid_trust_q31 *self);
+void pvid_trust_skip_q31(pvid_trust_q31 *self, bool rejected);
+bool pvid_trust_start_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
+                          int32_t p[PVID_MAX_P]);
+
 /* Factor on the sums before the rows of the next group are added, Q31; 0: no renewal, or too little would remain.
  * Call it once per group. */
 int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self);
@@ -58,11 +64,13 @@ const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self);
  *   reason, size:    of that solve
  *   above_noise:     of the assessment
  *   variance_ratio:  residual variance of the group over its expectation, Q24, >= 0
+ *   freedom:         rows of the group less nuisances
  *   candidate:       the assessed estimate; what is published has the neglected terms
  *
  * Returns and counts the reason of trust.h. */
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
-                                 bool above_noise, int64_t variance_ratio, pvid_estimate_q31 *candidate);
+                                 bool above_noise, int64_t variance_ratio, uint16_t freedom,
+                                 pvid_estimate_q31 *candidate);
 
 #ifdef __cplusplus
 }

@@ -32,6 +32,14 @@ static inline void pvid_gate_begin_anew_f32(pvid_gate_f32 *self)
     self->judged = 0.0f;
 }
 
+/* As behind init: a usual size from before means nothing. */
+static inline void pvid_gate_restart_f32(pvid_gate_f32 *self)
+{
+    self->judged = 0.0f;
+    self->scale = self->floor;
+    self->usual = self->floor;
+}
+
 /* pvid_gate_passes_f32: inlined for a finite residual while the memory fills, and for one of usual size behind that. */
 static inline bool pvid_gate_judges_f32(pvid_gate_f32 *self, float square)
 {

@@ -13,6 +13,7 @@
 #include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
+#include "judge/standing.h"
 #include "judge/trust_f32.h"
 #include "judge/verdict.h"
 #include "number/unroll.h"
@@ -82,6 +83,7 @@ void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
     pvid_publication_write(&self->mark, self->estimate.p, self->copy.p, estimator->p, sizeof self->estimate.p,
                            self->mark.number[0]);
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    memcpy(self->trusted, estimator->p, sizeof self->trusted);
 }
 
 PVID_COLD pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
@@ -107,6 +109,7 @@ PVID_COLD pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust
     publish_start(&self->estimate, estimator);
     self->copy = self->estimate;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    memcpy(self->trusted, estimator->p, sizeof self->trusted);
     return PVID_OK;
 }
 
@@ -262,7 +265,8 @@ PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason 
         !(candidate->least_pivot >= self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !self->arrived) {
+    if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !self->arrived ||
+        self->standing.opened) {
         return PVID_HELD_UNCERTAIN;
     }
     return PVID_UPDATED;
@@ -307,12 +311,83 @@ PVID_COLD pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_est
     return verdict_on(self, reason, above_noise, error, candidate);
 }
 
+/* ---- the standing ---- */
+
+/* The standing to the published estimate, which stays. */
+PVID_COLD static void share_standing(pvid_trust_f32 *self)
+{
+    pvid_publication_write(&self->mark, &self->estimate.standing, &self->copy.standing, &self->standing.now,
+                           sizeof self->standing.now, self->mark.number[0]);
+}
+
+PVID_COLD void pvid_trust_open_f32(pvid_trust_f32 *self)
+{
+    self->standing.opened = true;
+}
+
+PVID_COLD void pvid_trust_skip_f32(pvid_trust_f32 *self, bool rejected)
+{
+    pvid_standing_skip(&self->standing, rejected);
+    share_standing(self);
+}
+
+PVID_COLD void pvid_trust_compare_f32(pvid_trust_f32 *self, size_t n_p, const pvid_estimate_f32 *candidate)
+{
+    const float away = (float)(PVID_STANDING_AWAY * PVID_STANDING_AWAY);
+    bool differs = false;
+    bool grew = false;
+    for (size_t a = 0; self->published && (a < n_p); a++) {
+        const float held = self->estimate.se[a];
+        const float joint = (candidate->se[a] * candidate->se[a]) + (held * held);
+        const float way = candidate->p[a] - self->estimate.p[a];
+        differs = differs || ((way * way) > (away * joint));
+        grew = grew || (candidate->se[a] > ((float)PVID_STANDING_GROWN * held));
+    }
+    self->standing.contradicts = differs;
+    self->standing.grew = grew;
+}
+
+PVID_COLD void pvid_trust_stand_f32(pvid_trust_f32 *self, pvid_reason verdict, pvid_reason reason, float variance_ratio,
+                                    uint16_t freedom, bool errs, const pvid_estimate_f32 *candidate)
+{
+    pvid_standing_window window;
+    window.published = verdict == PVID_UPDATED;
+    window.solved = reason == PVID_UPDATED;
+    window.arrived = self->arrived;
+    window.judges = self->config.misfit_max > 0.0f;
+    window.freedom = freedom;
+    window.errs = errs;
+    window.ratio = PVID_STANDING_CLIP; /* NaN too */
+    if (variance_ratio < (float)(PVID_STANDING_CLIP >> 16u)) {
+        window.ratio = (uint32_t)(variance_ratio * 65536.0f);
+    }
+    if (pvid_standing_take(&self->standing, &window)) {
+        memcpy(self->trusted, candidate->p, sizeof self->trusted);
+    }
+}
+
+PVID_COLD bool pvid_trust_start_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
+                                    float p[PVID_MAX_P])
+{
+    uint8_t number = 0;
+    const bool starts = pvid_standing_starts(&self->standing, reason == PVID_UPDATED, &number);
+    share_standing(self);
+    for (size_t a = 0; starts && (a < estimator->model->n_p); a++) {
+        const uint32_t x = 3u * pvid_standing_spread(number, (uint32_t)a);
+        const float factor = (float)(65536u + x) / (float)(262144u - x);
+        p[a] = pvid_is_positive_f32(estimator->model, a) ? (factor * self->trusted[a]) : self->trusted[a];
+    }
+    return starts;
+}
+
 PVID_COLD pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
                                              pvid_reason reason, pvid_estimate_f32 *candidate)
 {
     if (verdict == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
+        candidate->standing = self->standing.now;
+        candidate->standing.age = 0;
         if ((PVID_NEGLECTED != 0) && (self->config.neglected > 0.0f)) {
             add_neglected(self, estimator, candidate);
         }
@@ -323,11 +398,16 @@ PVID_COLD pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimato
 }
 
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
-                                 bool above_noise, float variance_ratio, pvid_estimate_f32 *candidate)
+                                 bool above_noise, float variance_ratio, uint16_t freedom, pvid_estimate_f32 *candidate)
 {
+    if (reason == PVID_UPDATED) {
+        pvid_trust_compare_f32(self, estimator->model->n_p, candidate);
+    }
     const pvid_reason verdict =
         pvid_trust_decide_f32(self, estimator, reason, size, above_noise, variance_ratio, candidate);
-    return pvid_trust_publish_f32(self, estimator, verdict, reason, candidate);
+    const pvid_reason reported = pvid_trust_publish_f32(self, estimator, verdict, reason, candidate);
+    pvid_trust_stand_f32(self, verdict, reason, variance_ratio, freedom, false, candidate);
+    return reported;
 }
 
 uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config)

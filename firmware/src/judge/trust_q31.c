@@ -7,6 +7,7 @@
 #include "number/fingerprint_numbers_q31.h"
 #include "solve/state_q31.h"
 #include "judge/publication.h"
+#include "judge/standing.h"
 #include "judge/trust_q31.h"
 #include "judge/verdict.h"
 #include "number/unroll.h"
@@ -76,6 +77,7 @@ void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estima
     pvid_publication_write(&self->mark, self->estimate.p, self->copy.p, estimator->p, sizeof self->estimate.p,
                            self->mark.number[0]);
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    memcpy(self->trusted, estimator->p, sizeof self->trusted);
 }
 
 pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q31 *config,
@@ -265,7 +267,8 @@ static pvid_reason verdict(const pvid_trust_q31 *self, pvid_reason reason, int64
         (candidate->least_pivot < self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    if ((self->groups < self->config.groups_min) || (error > self->config.se_max) || !self->arrived) {
+    if ((self->groups < self->config.groups_min) || (error > self->config.se_max) || !self->arrived ||
+        self->standing.opened) {
         return PVID_HELD_UNCERTAIN;
     }
     return PVID_UPDATED;
@@ -305,8 +308,9 @@ PVID_COLD static void add_neglected(const pvid_trust_q31 *self, const pvid_estim
     }
 }
 
-pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
-                                 bool above_noise, int64_t variance_ratio, pvid_estimate_q31 *candidate)
+pvid_reason pvid_trust_decide_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
+                                  int64_t size, bool above_noise, int64_t variance_ratio,
+                                  const pvid_estimate_q31 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
@@ -316,10 +320,90 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
     const int64_t error = largest_error(estimator, candidate);
     self->arrived = (reason == PVID_UPDATED) && has_arrived(size, error);
     raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, error, candidate);
-    const pvid_reason judged = verdict(self, reason, error, above_noise, candidate);
+    return verdict(self, reason, error, above_noise, candidate);
+}
+
+/* ---- the standing ---- */
+
+/* The standing to the published estimate, which stays. */
+static void share_standing(pvid_trust_q31 *self)
+{
+    pvid_publication_write(&self->mark, &self->estimate.standing, &self->copy.standing, &self->standing.now,
+                           sizeof self->standing.now, self->mark.number[0]);
+}
+
+void pvid_trust_open_q31(pvid_trust_q31 *self)
+{
+    self->standing.opened = true;
+}
+
+void pvid_trust_skip_q31(pvid_trust_q31 *self, bool rejected)
+{
+    pvid_standing_skip(&self->standing, rejected);
+    share_standing(self);
+}
+
+/* Whether the candidate differs from the published estimate, and whether its standard errors have grown. */
+PVID_COLD static void compare(pvid_trust_q31 *self, size_t n_p, const pvid_estimate_q31 *candidate)
+{
+    bool differs = false;
+    bool grew = false;
+    for (size_t a = 0; self->published && (a < n_p); a++) {
+        const int64_t se = candidate->se[a];
+        const int64_t held = self->estimate.se[a];
+        const int64_t way = (int64_t)pvid_magnitude_q31((int64_t)candidate->p[a] - self->estimate.p[a]);
+        const int64_t part = way / PVID_STANDING_AWAY; /* below 2^30 */
+        differs = differs || ((part * part) > ((se * se) + (held * held)));
+        grew = grew || (se > (PVID_STANDING_GROWN * held));
+    }
+    self->standing.contradicts = differs;
+    self->standing.grew = grew;
+}
+
+PVID_COLD void pvid_trust_stand_q31(pvid_trust_q31 *self, pvid_reason judged, pvid_reason reason,
+                                    int64_t variance_ratio, uint16_t freedom, bool errs,
+                                    const pvid_estimate_q31 *candidate)
+{
+    const int64_t most = (int64_t)PVID_STANDING_CLIP << (PVID_VARIANCE_RATIO_BITS - 16);
+    const int64_t ratio = pvid_clamp_q31(variance_ratio, most);
+    pvid_standing_window window;
+    window.published = judged == PVID_UPDATED;
+    window.solved = reason == PVID_UPDATED;
+    window.arrived = self->arrived;
+    window.judges = self->config.misfit_max > 0u;
+    window.freedom = freedom;
+    window.errs = errs;
+    window.ratio = (uint32_t)pvid_round_shift_q31((ratio > 0) ? ratio : 0, PVID_VARIANCE_RATIO_BITS - 16u);
+    if (pvid_standing_take(&self->standing, &window)) {
+        memcpy(self->trusted, candidate->p, sizeof self->trusted);
+    }
+}
+
+PVID_COLD bool pvid_trust_start_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
+                                    int32_t p[PVID_MAX_P])
+{
+    uint8_t number = 0;
+    const bool starts = pvid_standing_starts(&self->standing, reason == PVID_UPDATED, &number);
+    share_standing(self);
+    for (size_t a = 0; starts && (a < estimator->model->n_p); a++) {
+        const int64_t x = 3 * (int64_t)pvid_standing_spread(number, (uint32_t)a);
+        const int64_t whole = (self->trusted[a] * (65536 + x)) / (262144 - x);
+        p[a] = pvid_is_positive_q31(estimator->model, a) ? (int32_t)pvid_clamp_q31(whole, INT32_MAX) : self->trusted[a];
+    }
+    return starts;
+}
+
+pvid_reason pvid_trust_publish_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason judged,
+                                   pvid_reason reason, pvid_estimate_q31 *candidate)
+{
+    if (reason == PVID_UPDATED) {
+        compare(self, estimator->model->n_p, candidate);
+    }
     if (judged == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
+        candidate->standing = self->standing.now;
+        candidate->standing.age = 0;
         if (self->config.neglected > 0) {
             add_neglected(self, estimator, candidate);
         }
@@ -327,6 +411,17 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
         self->published = true;
     }
     return pvid_trust_report(&estimator->counters, judged, reason, self->misfit);
+}
+
+pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
+                                 bool above_noise, int64_t variance_ratio, uint16_t freedom,
+                                 pvid_estimate_q31 *candidate)
+{
+    const pvid_reason judged =
+        pvid_trust_decide_q31(self, estimator, reason, size, above_noise, variance_ratio, candidate);
+    const pvid_reason reported = pvid_trust_publish_q31(self, estimator, judged, reason, candidate);
+    pvid_trust_stand_q31(self, judged, reason, variance_ratio, freedom, false, candidate);
+    return reported;
 }
 
 uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *config)

@@ -70,17 +70,16 @@ static bool drifts_are_valid(const pvid_estimator_config_f32 *config)
 
 #if PVID_MAX_DRIFTS > 0
 /* What is known of the start of parameters in no row, as if of a row. */
-PVID_COLD static void anchor(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+PVID_COLD static void anchor(pvid_estimator_f32 *self)
 {
-    const pvid_model_f32 *model = config->model;
+    const pvid_model_f32 *model = self->model;
     for (size_t k = 0; (model->anchor_sd != NULL) && (k < model->n_c); k++) {
         const float sd = model->anchor_sd[model->c_column[k]];
         if (sd > 0.0f) {
-            const float ratio = config->row_sd / sd;
             pvid_block block;
             pvid_information_block_f32(model, model->c_row[k], &block);
             const size_t place = pvid_pattern_diagonal_f32(block.n, (size_t)model->c_row[k] - block.first);
-            self->information.low[block.moment + place] = ratio * ratio;
+            self->information.low[block.moment + place] = self->settings.row_variance / (sd * sd);
         }
     }
 }
@@ -92,7 +91,7 @@ PVID_COLD static void prepare_drifts(pvid_estimator_f32 *self, const pvid_estima
 #if PVID_MAX_DRIFTS > 0
     if (config->model->n_drifts > 0u) {
         self->settings.drift_keep = pvid_settings_decay_f32(1.0f / (config->model->drift_s * config->update_rate_hz));
-        anchor(self, config);
+        anchor(self);
     }
 #else
     (void)self;
@@ -202,6 +201,22 @@ void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
     }
 #endif
     self->model->theta(self->p, self->theta);
+}
+
+PVID_COLD void pvid_estimator_clear_f32(pvid_estimator_f32 *self)
+{
+    pvid_information_fade_f32(&self->information, 0.0f);
+#if PVID_MAX_DRIFTS > 0
+    if (self->model->n_drifts > 0u) {
+        anchor(self);
+    }
+#endif
+    self->information.age = 0;
+    self->group_rss = 0.0f;
+    self->group_weight = 0.0f;
+#if PVID_FEEDBACK
+    memset(self->innovation, 0, sizeof self->innovation);
+#endif
 }
 
 /* ---- rows, solves, assessments ---- */

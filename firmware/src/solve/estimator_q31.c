@@ -12,6 +12,7 @@
 #include "solve/settings_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
+#include "number/unroll.h"
 
 #define FORMAT_MAX 64
 
@@ -136,6 +137,16 @@ void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t v
     self->p[index] = (int32_t)((above > self->settings.upper[index]) ? self->settings.upper[index] : above);
     pvid_estimator_theta_q31(self, self->p, theta);
     pvid_estimator_set_theta_q31(self, theta);
+}
+
+PVID_COLD void pvid_estimator_clear_q31(pvid_estimator_q31 *self)
+{
+    memset(self->information.sums, 0, sizeof self->information.sums);
+    memset(self->fresh, 0, sizeof self->fresh);
+    self->information.exponent = 0;
+    self->information.age = 0;
+    self->group_rss = 0;
+    self->group_weight = 0;
 }
 
 /* ---- rows ---- */

@@ -27,4 +27,7 @@ static inline bool pvid_estimator_is_ready_f32(const pvid_estimator_f32 *self)
     return ready;
 }
 
+/* Sums of zero, as behind init: p stays, until the caller places it. */
+void pvid_estimator_clear_f32(pvid_estimator_f32 *self);
+
 #endif

@@ -43,6 +43,9 @@ static inline const int64_t *pvid_b_of_q31(const pvid_information_q31 *informati
     return &information->sums[((size_t)information->n_sums - 2u) - information->n_theta];
 }
 
+/* Sums of zero, as behind init: p stays, until the caller places it. */
+void pvid_estimator_clear_q31(pvid_estimator_q31 *self);
+
 /* Whether init has accepted a configuration. */
 static inline bool pvid_estimator_is_ready_q31(const pvid_estimator_q31 *self)
 {

@@ -291,6 +291,7 @@ PVID_NOINLINE static pvid_reason end_half(pvid_weak_f32 *self)
         pvid_weak_sums_join_f32(&self->sums, self->history.edge);
     } else {
         pvid_weak_finish_skip_f32(&self->finish);
+        pvid_trust_skip_f32(&self->trust, false);
     }
     return reason;
 }

@@ -16,6 +16,7 @@
 #include "solve/pattern_f32.h"
 #include "solve/products_f32.h"
 #include "solve/staged_f32.h"
+#include "solve/state_f32.h"
 #include "weak/columns_f32.h"
 #include "weak/error.h"
 #include "weak/error_f32.h"
@@ -48,9 +49,11 @@ enum {
     STAGE_PREPARE, /* of the assessment; this and the next three only behind a solve that was due */
     STAGE_ASSESS,  /* several stages */
     STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
-    STAGE_GROW,    /* the covariance grows with the standard errors */
+    STAGE_GROW,    /* the covariance grows with the standard errors; it is compared with the published estimate */
     STAGE_JUDGE,   /* trust.h decides */
     STAGE_PUBLISH, /* publishes the estimate or holds it */
+    STAGE_STAND,   /* the standing of the published one: standing.h */
+    STAGE_RESTART, /* p starts again, if it has to */
     STAGE_IDLE = PVID_WEAK_IDLE
 };
 
@@ -134,6 +137,7 @@ void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self)
     self->used = 0;
     self->iteration = 0;
     self->expected = 0.0f;
+    self->explained = 0.0f;
     self->free = 0.0f;
     self->square = 0.0f;
     begin_kind(self);
@@ -452,6 +456,7 @@ PVID_COLD static void end_kind(pvid_weak_f32 *self)
         begin_kind(finish);
     } else if (finish->used == 0u) {
         pvid_weak_scores_skip_f32(&finish->scores);
+        pvid_trust_skip_f32(&self->trust, true);
         finish->stage = STAGE_IDLE;
     } else {
         finish->stage = STAGE_SCORE;
@@ -477,10 +482,11 @@ PVID_COLD static pvid_reason accept_kind(pvid_weak_f32 *self, float freedom)
     const pvid_gate_verdict verdict = pvid_gate_judge_f32(&finish->gate[finish->kind], finish->rss / freedom);
     if (verdict == PVID_GATE_REJECTS) {
         pvid_count_up(&self->estimator.counters.rejected_outlier);
+        self->trust.standing.rejects = true;
         return PVID_REJECTED_OUTLIER;
     }
     if (verdict == PVID_GATE_OPENS) {
-        begin_anew(self);
+        pvid_trust_open_f32(&self->trust);
     }
     return PVID_ACCUMULATED;
 }
@@ -531,7 +537,10 @@ PVID_COLD static bool correct_stage(pvid_weak_f32 *self)
     if (finish->compensation) {
         (void)pvid_estimator_add_to_b_f32(&self->estimator, finish->work.rows.pull);
     }
-    finish->expected += pvid_weak_white_sensors_f32(&finish->white, self->design);
+    const float sensors = pvid_weak_white_sensors_f32(&finish->white, self->design);
+    finish->expected += sensors;
+    finish->explained += sensors + (self->design->error_variance[finish->kind] *
+                                    pvid_weak_white_error_share_f32(&finish->white, self->design, finish->kind));
     return false;
 }
 
@@ -687,17 +696,22 @@ PVID_COLD static bool grow_stage(pvid_weak_f32 *self)
             estimate->covariance[a][b] *= growth[a] * growth[b];
         }
     }
+    pvid_trust_compare_f32(&self->trust, n_p, estimate);
     return false;
+}
+
+/* Residual variance of the window over that of its rows, a sum over the kinds. */
+static float ratio_to(const pvid_weak_finish_f32 *self, float variance)
+{
+    return self->work.solve.group_rss / (self->free * (variance / (float)self->used));
 }
 
 PVID_COLD static bool judge_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
-    const float expected = finish->expected / (float)finish->used;
-    const float variance_ratio = finish->work.solve.group_rss / (finish->free * expected);
-    finish->verdict =
-        (uint8_t)pvid_trust_decide_f32(&self->trust, &self->estimator, finish->reason, finish->size,
-                                       finish->work.solve.above_noise, variance_ratio, &finish->candidate);
+    finish->verdict = (uint8_t)pvid_trust_decide_f32(&self->trust, &self->estimator, finish->reason, finish->size,
+                                                     finish->work.solve.above_noise, ratio_to(finish, finish->expected),
+                                                     &finish->candidate);
     return false;
 }
 
@@ -706,10 +720,41 @@ PVID_COLD static bool publish_stage(pvid_weak_f32 *self)
     pvid_weak_finish_f32 *finish = &self->finish;
     finish->report = (uint8_t)pvid_trust_publish_f32(&self->trust, &self->estimator, (pvid_reason)finish->verdict,
                                                      finish->reason, &finish->candidate);
-    finish->stage = STAGE_IDLE;
     if (pvid_weak_error_follows(self->design->model->kinds) && (finish->left < 1.0f)) {
         begin_anew(self);
     }
+    return false;
+}
+
+PVID_COLD static bool stand_stage(pvid_weak_f32 *self)
+{
+    pvid_weak_finish_f32 *finish = &self->finish;
+    bool errs = false;
+    for (size_t i = 0; i < self->design->model->kinds; i++) {
+        errs = errs || (finish->error[i].variance > self->design->error_variance[i]);
+    }
+    pvid_trust_stand_f32(&self->trust, (pvid_reason)finish->verdict, finish->reason,
+                         ratio_to(finish, finish->explained), (uint16_t)finish->free, errs, &finish->candidate);
+    return false;
+}
+
+/* p starts again: sums of zero, gates and errors of the equations as behind init. */
+PVID_COLD static bool restart_stage(pvid_weak_f32 *self)
+{
+    pvid_weak_finish_f32 *finish = &self->finish;
+    float p[PVID_MAX_P];
+    finish->stage = STAGE_IDLE;
+    if (!pvid_trust_start_f32(&self->trust, &self->estimator, finish->reason, p)) {
+        return false;
+    }
+    pvid_estimator_clear_f32(&self->estimator);
+    pvid_estimator_place_f32(&self->estimator, p);
+    for (size_t i = 0; i < self->design->model->kinds; i++) {
+        pvid_gate_restart_f32(&finish->gate[i]);
+    }
+    pvid_weak_error_init_f32(finish->error, self->design);
+    finish->left = 1.0f;
+    begin_anew(self);
     return false;
 }
 
@@ -765,8 +810,12 @@ static bool run_stage(pvid_weak_f32 *self, uint8_t stage)
         return grow_stage(self);
     case STAGE_JUDGE:
         return judge_stage(self);
-    default:
+    case STAGE_PUBLISH:
         return publish_stage(self);
+    case STAGE_STAND:
+        return stand_stage(self);
+    default:
+        return restart_stage(self);
     }
 }
 
@@ -834,7 +883,8 @@ PVID_COLD uint32_t pvid_weak_finish_columns_f32(const pvid_weak_f32 *self)
 PVID_COLD uint32_t pvid_weak_finish_stages_f32(const pvid_weak_f32 *self)
 {
     const pvid_weak_model_f32 *model = self->design->model;
-    uint32_t stages = 7u + model->model->n_p; /* SCORE, BEGIN, MEAN, PREPARE, GROW, JUDGE, PUBLISH; CLUSTER */
+    uint32_t stages =
+        9u + model->model->n_p; /* SCORE, BEGIN, MEAN, PREPARE, GROW, JUDGE, PUBLISH, STAND, RESTART; CLUSTER */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }

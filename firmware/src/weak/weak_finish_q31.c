@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "judge/gate_q31.h"
+#include "judge/trust_q31.h"
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
@@ -44,6 +45,7 @@ enum {
     STAGE_ASSESS,  /* several stages */
     STAGE_CLUSTER, /* standard errors of a few parameters from the scatter of the scores */
     STAGE_JUDGE,   /* trust_q31.h publishes the estimate or holds it */
+    STAGE_RESTART, /* p starts again, if it has to */
     STAGE_IDLE = PVID_WEAK_IDLE_Q31
 };
 
@@ -233,6 +235,7 @@ static void begin_noise(pvid_weak_q31 *self)
     memset(self->estimator.noise_table, 0, sizeof self->estimator.noise_table);
     memset(finish->known.pull, 0, sizeof finish->known.pull);
     finish->known.sensors = pvid_scaled_of_q31(0, 0);
+    finish->known.explained = finish->known.sensors;
     self->estimator.noise_rows = 0;
     for (size_t i = 0; (self->design->n_noise > 0u) && (i < model->kinds); i++) {
         const uint32_t rows = (uint32_t)self->design->functions - model->kind[i].nuisances;
@@ -248,13 +251,17 @@ static void explain(pvid_weak_q31 *self)
     pvid_weak_error_q31 *error = &finish->error[finish->kind];
     const pvid_scaled_q31 share =
         pvid_weak_noise_error_share_q31(design, finish->kind, finish->work.rows.parts.noise.share);
+    const pvid_scaled_q31 least = design->error_variance[finish->kind];
+    const pvid_scaled_q31 more = pvid_scaled_minus_q31(error->variance, least);
     finish->known.sensors =
         pvid_scaled_plus_q31(finish->known.sensors, pvid_weak_noise_sensors_q31(design, error->variance, share));
+    finish->known.explained =
+        pvid_scaled_plus_q31(finish->known.explained, pvid_weak_noise_sensors_q31(design, more, share));
     if (!pvid_weak_error_follows(design->model->kinds)) {
         return;
     }
     const pvid_scaled_q31 before = error->variance;
-    const int32_t left = pvid_weak_error_change_q31(error, design->error_variance[finish->kind], share);
+    const int32_t left = pvid_weak_error_change_q31(error, least, share);
     if (left < INT32_MAX) {
         pvid_gate_begin_anew_q31(&finish->gate[finish->kind]);
     }
@@ -446,7 +453,7 @@ static bool passes(pvid_weak_q31 *self)
         return false;
     }
     if (verdict == PVID_GATE_OPENS) {
-        begin_anew(self);
+        pvid_trust_open_q31(&self->trust);
     }
     const pvid_scaled_q31 least = self->design->error_variance[finish->kind];
     if (pvid_weak_error_follows(self->design->model->kinds) && finish->known.used && self->trust.arrived &&
@@ -602,14 +609,53 @@ PVID_COLD static bool cluster_stage(pvid_weak_q31 *self)
     return end < n_p;
 }
 
+/* The window's residual variance over what the sensors and the design's errors of the equations explain. */
+static int64_t explained_ratio(const pvid_weak_finish_q31 *self)
+{
+    if ((self->known.sensors.m <= 0) || (self->known.explained.m <= 0)) {
+        return self->rss;
+    }
+    const pvid_scaled_q31 part = pvid_scaled_over_q31(self->known.sensors, self->known.explained);
+    const pvid_scaled_q31 ratio = pvid_scaled_of_q31(self->rss, -(int32_t)PVID_VARIANCE_RATIO_BITS);
+    return pvid_scaled_fixed_q31(pvid_scaled_times_q31(ratio, part), PVID_VARIANCE_RATIO_BITS);
+}
+
 static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
-                                   finish->work.solve.above_noise, finish->rss, &finish->work.solve.matrix.estimate);
+    pvid_estimate_q31 *candidate = &finish->work.solve.matrix.estimate;
+    bool errs = false;
+    for (size_t i = 0; i < self->design->model->kinds; i++) {
+        errs = errs || pvid_scaled_exceeds_q31(finish->error[i].variance, self->design->error_variance[i]);
+    }
+    const pvid_reason judged = pvid_trust_decide_q31(&self->trust, &self->estimator, finish->reason, finish->size,
+                                                     finish->work.solve.above_noise, finish->rss, candidate);
+    *reason = pvid_trust_publish_q31(&self->trust, &self->estimator, judged, finish->reason, candidate);
+    pvid_trust_stand_q31(&self->trust, judged, finish->reason, explained_ratio(finish), finish->free, errs, candidate);
     if (finish->left < INT32_MAX) {
         begin_anew(self);
     }
+}
+
+/* p starts again, if it has to: sums of zero, gates and errors of the equations as behind init. */
+PVID_COLD static void restart_stage(pvid_weak_q31 *self)
+{
+    pvid_weak_finish_q31 *finish = &self->finish;
+    int32_t p[PVID_MAX_P];
+    if (!pvid_trust_start_q31(&self->trust, &self->estimator, finish->reason, p)) {
+        return;
+    }
+    pvid_estimator_clear_q31(&self->estimator);
+    for (uint8_t a = 0; a < self->estimator.model->n_p; a++) {
+        pvid_estimator_place_q31(&self->estimator, a, p[a]);
+    }
+    for (size_t i = 0; i < self->design->model->kinds; i++) {
+        pvid_gate_restart_q31(&finish->gate[i]);
+    }
+    pvid_weak_error_init_q31(finish->error, self->design);
+    finish->left = INT32_MAX;
+    finish->known.age = NOISE_WINDOWS; /* the noise at this p */
+    begin_anew(self);
 }
 
 /* ---- the order of the stages ---- */
@@ -627,6 +673,7 @@ static void end_kind(pvid_weak_q31 *self)
         begin_solves(self);
     } else {
         pvid_weak_scores_skip_q31(&finish->scores);
+        pvid_trust_skip_q31(&self->trust, true);
         finish->stage = STAGE_IDLE;
     }
 }
@@ -697,6 +744,7 @@ static void step_kind(pvid_weak_q31 *self, pvid_reason *reason)
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         *reason = PVID_REJECTED_OUTLIER;
         finish->rejected = true;
+        self->trust.standing.rejects = true;
     }
     if (finish->stage == (uint8_t)STAGE_PULL) {
         finish->used++;
@@ -743,6 +791,10 @@ void pvid_weak_finish_step_q31(pvid_weak_q31 *self, pvid_reason *reason)
         break;
     case STAGE_JUDGE:
         judge_stage(self, reason);
+        finish->stage = STAGE_RESTART;
+        break;
+    case STAGE_RESTART:
+        restart_stage(self);
         finish->stage = STAGE_IDLE;
         break;
     case STAGE_IDLE:
@@ -797,7 +849,7 @@ uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self)
 uint32_t pvid_weak_finish_stages_q31(const pvid_weak_q31 *self)
 {
     const pvid_weak_model_q31 *model = self->design->model;
-    uint32_t stages = 2u + stages_of(self->estimator.model->n_p, CLUSTERS_PER_STAGE); /* MEAN, JUDGE */
+    uint32_t stages = 3u + stages_of(self->estimator.model->n_p, CLUSTERS_PER_STAGE); /* MEAN, JUDGE, RESTART */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }

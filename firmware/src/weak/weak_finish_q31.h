@@ -18,7 +18,7 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self);
 void pvid_weak_finish_skip_q31(pvid_weak_finish_q31 *self);
 
 /* The stage behind the last one. */
-#define PVID_WEAK_IDLE_Q31 20u
+#define PVID_WEAK_IDLE_Q31 21u
 
 /* Whether a window is being processed. */
 static inline bool pvid_weak_finish_is_busy_q31(const pvid_weak_finish_q31 *self)

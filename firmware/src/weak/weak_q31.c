@@ -149,16 +149,23 @@ static bool is_still(const pvid_weak_q31 *self)
     return still;
 }
 
+/* A whole window that is not used. */
+static void drop(pvid_weak_q31 *self)
+{
+    pvid_weak_finish_skip_q31(&self->finish);
+    pvid_trust_skip_q31(&self->trust, false);
+}
+
 /* A whole window. Returns PVID_ACCUMULATED, or the reason why it is dropped. */
 static pvid_reason hand_over(pvid_weak_q31 *self)
 {
     self->warm = true;
     if (self->frozen) {
-        pvid_weak_finish_skip_q31(&self->finish);
+        drop(self);
         return PVID_HELD_FROZEN;
     }
     if (self->drive.still[0] || self->drive.still[1]) {
-        pvid_weak_finish_skip_q31(&self->finish);
+        drop(self);
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }

@@ -3,6 +3,7 @@
 #define PVID_DETAIL_TRUST_STATE_H
 
 #include "pvid/trust.h"
+#include "pvid/detail/standing_state.h"
 
 /* Only the functions of trust.h write to it. */
 struct pvid_trust_f32 {
@@ -22,6 +23,8 @@ struct pvid_trust_f32 {
     float anchor[PVID_MAX_P];       /* p at which the rows in the sums last agreed with p, or at the last renewal */
     float long_mean;                /* of the variance ratios (residual variance over its expectation) of the groups */
     float recent[PVID_TRUST_SHORT]; /* variance ratios of the last groups */
+    float trusted[PVID_MAX_P];      /* p behind several valid publications in a row; the start before */
+    pvid_standing_judge standing;
     pvid_publication_mark mark;
     pvid_estimate_f32 estimate; /* the published one, for the context that calls step */
     pvid_estimate_f32 copy;     /* its second copy, for other contexts: see publication.h */

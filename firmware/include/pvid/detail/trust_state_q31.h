@@ -3,6 +3,7 @@
 #define PVID_DETAIL_TRUST_STATE_Q31_H
 
 #include "pvid/trust_q31.h"
+#include "pvid/detail/standing_state.h"
 
 /* Only the functions of trust_q31.h write to it. */
 struct pvid_trust_q31 {
@@ -22,6 +23,8 @@ struct pvid_trust_q31 {
     int32_t anchor[PVID_MAX_P]; /* p at which the rows in the sums last agreed with p, or at the last renewal */
     int64_t long_mean;          /* of the variance ratios of the groups, PVID_VARIANCE_RATIO_BITS */
     int64_t recent[PVID_TRUST_SHORT];
+    int32_t trusted[PVID_MAX_P]; /* p behind several valid publications in a row; the start before */
+    pvid_standing_judge standing;
     pvid_publication_mark mark;
     pvid_estimate_q31 estimate; /* the published one, for the context that calls step */
     pvid_estimate_q31 copy;     /* its second copy, for other contexts: see publication.h */

@@ -188,6 +188,7 @@ typedef struct {
     float size;         /* of the last step, relative */
     float rss;          /* of the kind's rows before the steps */
     float expected;     /* sum over the kinds of the rows' variance by the sensors alone */
+    float explained;    /* likewise, by the design's errors of the equations too */
     float free;         /* rows less nuisances of the kinds that were added */
     float square;       /* sum of squares of their residuals before the steps */
     float left;         /* of the older rows' information, behind this window: pvid_weak_error_take_f32 */

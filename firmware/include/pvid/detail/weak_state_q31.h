@@ -146,11 +146,12 @@ typedef union {
 
 /* What the sensors' noise does to the rows, at the p of one of the last windows. */
 typedef struct {
-    bool used;               /* anything needs it */
-    bool renewed;            /* it and the reflections are, in the present window */
-    uint8_t age;             /* windows since they were computed */
-    bool compensates;        /* `pull` is added to b */
-    pvid_scaled_q31 sensors; /* part of the rows' variance that the sensors explain, summed over kinds */
+    bool used;                 /* anything needs it */
+    bool renewed;              /* it and the reflections are, in the present window */
+    uint8_t age;               /* windows since they were computed */
+    bool compensates;          /* `pull` is added to b */
+    pvid_scaled_q31 sensors;   /* part of the rows' variance that the sensors explain, summed over kinds */
+    pvid_scaled_q31 explained; /* that they and the design's errors of the equations explain, likewise */
     pvid_scaled_q31 pull[PVID_MAX_THETA_Q31]; /* what it takes from b in a window, in units of b */
 } pvid_weak_known_q31;
 

@@ -59,7 +59,7 @@ def window_stages(config: WeakConfig) -> int:
     solve = projection + 5 + -(-theta.n_theta // _ROWS)
     solves = solve + 1 + ((0 if rate else config.iterations - 1) * (solve + 1))
     of_kinds = sum(_of_kind(config, one) for one in config.design.model.kind)
-    return of_kinds + 7 + theta.n_p + solves + 4 + theta.n_p
+    return of_kinds + 9 + theta.n_p + solves + 4 + theta.n_p
 
 
 def shares_place(config: WeakConfig) -> bool:

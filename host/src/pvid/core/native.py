@@ -233,6 +233,7 @@ class Stepper:
             hash=np.empty(ticks if hashes else 0, np.uint32),
             published=np.empty(published, sample),
             published_se=np.empty(published, sample),
+            standing=np.empty(published[0], np.uint32),
             estimate=np.empty(-(-ticks // estimate_every) if estimate_every else 0, self._estimate_type),
         )
         headers = self.native.headers

@@ -26,7 +26,7 @@ _PUBLIC = re.compile(
 )
 _MACRO = re.compile(r"^[ \t]*#[ \t]*define (\w+)", re.MULTILINE)
 _TEXTS = "pvid/text.h"
-_IN_HEADER = ("pvid/status.h", _TEXTS)
+_IN_HEADER = ("pvid/standing.h", "pvid/status.h", _TEXTS)
 _FIRST = "number/uncontracted.h"
 _PART = re.compile(r"A part of \w+\.c\.")
 
@@ -39,7 +39,7 @@ def amalgamated(d: Deployment) -> tuple[str, str]:
     """
     files = all_files(d)
     own = f"{d.name}_identifier.h"
-    header = [files["pvid/status.h"], files[_TEXTS], files[own]]
+    header = [files[name] for name in (*_IN_HEADER, own)]
     top = f"/* {d.library}.h and {d.library}.c: pvid in two files, with its licence in LICENSE.\n *\n * {d.banner} */\n"
     source = [
         top,

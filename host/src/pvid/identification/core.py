@@ -27,9 +27,9 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 from pvid.settings.cores import CORES
-from pvid.settings.enums import Core
+from pvid.settings.enums import Core, Standing
 from pvid.settings.enums import Reason as Outcome
-from pvid.settings.record import Record
+from pvid.settings.record import Record, standing_text
 
 if TYPE_CHECKING:
     from pvid.identification.validation import Validation
@@ -62,6 +62,7 @@ class CoreAnswer(Answer):
     values : by name: outputs of the model, then p; of the last published estimate
     published : whether there is one
     reason : of the last window
+    standing : of the estimate behind it, in words: pvid/standing.h
     misfit : of the published estimate; None: not judged
     windows : how many the identifier has judged
     hash : running hash of its state after the last tick
@@ -81,6 +82,7 @@ class CoreAnswer(Answer):
     values: Mapping[str, Value]
     published: bool
     reason: Outcome
+    standing: str
     misfit: float | None
     windows: int
     hash: int
@@ -167,8 +169,8 @@ class CoreAnswer(Answer):
         """Its last window, and the hash."""
         misfit = "not judged" if self.misfit is None else f"{self.misfit:.2g}"
         return [
-            f"verdict {self.verdict.word}; last window: {self.reason.text}; chi2 {misfit}; {self.windows} "
-            f"windows of {2 * self.hop_s:.3g} s; hash {self.hash:08x}"
+            f"verdict {self.verdict.word}; last window: {self.reason.text}; {self.standing}; chi2 {misfit}; "
+            f"{self.windows} windows of {2 * self.hop_s:.3g} s; hash {self.hash:08x}"
         ]
 
     @property
@@ -189,6 +191,7 @@ class CoreAnswer(Answer):
             | {
                 "chi2": self.misfit,
                 "reason": self.reason.text,
+                "standing": self.standing,
                 "window_s": 2 * self.hop_s,
                 "windows": self.windows,
                 "functions": self.functions,
@@ -320,6 +323,7 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
         values=values(found.verdict),
         published=published,
         reason=outcome,
+        standing=standing_text(int(record.standing[-1])) if len(record.standing) else Standing.NONE.text,
         misfit=None if not published or np.isnan(misfit) else misfit,
         windows=int(len(ends)),
         hash=identifier.running_hash,

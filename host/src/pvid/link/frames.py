@@ -408,6 +408,7 @@ class RawCount(_Measured):
 
 
 _UPPER = MAX_P * (MAX_P + 1) // 2
+NO_STANDING = 0xFFFFFFFF  # of a board that reports none
 
 
 def upper_triangle(matrix: npt.ArrayLike) -> tuple[Any, ...]:
@@ -429,7 +430,8 @@ def _symmetric(upper: tuple[float, ...]) -> Float:
 class Estimate(Message):
     """Board to PC: the estimate after the header's tick (pvid_estimate_f32).
 
-    `reason` is reason of the last group of rows: of the last tick that was more than one row accumulated.
+    `reason` is reason of the last group of rows: of the last tick that was more than one row accumulated. `standing` is
+    that of the published estimate (pvid/standing.h): age + 2^16 state + 2^24 causes; NO_STANDING in the strong form.
     """
 
     TYPE = 6
@@ -442,6 +444,7 @@ class Estimate(Message):
     weight: float = wire("f32")
     reason: int = wire("u8")
     tick_high: int = wire("u16", absent=0)
+    standing: int = wire("u32", absent=NO_STANDING)
 
     FULL_KAPPA: ClassVar[float] = 1.0
 
@@ -493,6 +496,7 @@ class EstimateQ31(Message):
     weight: int = wire("u32")
     reason: int = wire("u8")
     tick_high: int = wire("u16", absent=0)
+    standing: int = wire("u32", absent=NO_STANDING)
 
     FULL_KAPPA: ClassVar[float] = 2.0**30
 

@@ -111,7 +111,7 @@ class History:
         self._points: dict[str, Thinned[_Point]] = {"estimates": Thinned(points), "refined": Thinned(points)}
         self._newest: dict[str, dict[str, float]] = {"estimates": {}, "refined": {}}
         self._reason = {"estimates": "", "refined": ""}
-        self._stage = ""
+        self._stage = self._standing = ""
         self._samples: deque[Float] = deque()  # t and the channels: [1 + channels, n] each
         self._count = 0
         self._began: int | None = None
@@ -179,6 +179,12 @@ class History:
         """That of the newest estimate (Reason.text); empty before the first."""
         self._work_off()
         return self._reason["estimates"]
+
+    @property
+    def standing(self) -> str:
+        """That of the published estimate of the weak form, in words; empty where there is none."""
+        self._work_off()
+        return self._standing
 
     def take(self, record: Record) -> None:
         """The next record; it costs the same whatever it holds."""
@@ -253,7 +259,7 @@ class History:
         """What was computed of another mechanism."""
         self._samples.clear()
         self._count = 0
-        self._stage = ""
+        self._stage = self._standing = ""
         for table, points in self._points.items():
             self._newest[table], self._reason[table] = {}, ""
             for point in points.rows:
@@ -286,6 +292,8 @@ class History:
         self._newest[table], self._reason[table] = newest, point.reason
         if table == "refined":
             self._stage = str(rows.columns["stage"][0])
+        else:
+            self._standing = str(rows.columns["standing"][0])
 
 
 def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:

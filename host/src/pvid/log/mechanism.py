@@ -22,7 +22,7 @@ Float = npt.NDArray[np.float64]
 Errors = dict[str, tuple[float, float]]
 
 # Columns of a log's tables that no sample and no parameter may be called.
-TAKEN = frozenset(("t", "tick", "segment", "run", "log_time", "updates", "kappa", "residual", "reason"))
+TAKEN = frozenset(("t", "tick", "segment", "run", "log_time", "updates", "kappa", "residual", "reason", "standing"))
 _MOST_KEPT = 16
 _LARGEST = 1e30  # value of a constant
 

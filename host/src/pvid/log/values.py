@@ -43,6 +43,7 @@ from pvid.log.file import Close, Segment
 from pvid.log.mechanism import TAKEN, UNNAMED, LogMechanism, mechanism_named
 from pvid.log.reader import Gap, Record, Restart
 from pvid.settings.enums import Reason, Stage
+from pvid.settings.record import standing_text
 
 _SLOWEST, _FASTEST = 1e-3, 1e9  # [Hz]
 _LONGEST_S = 3e9  # between the PC's clock and a tick: a century, which a time in ns has room for
@@ -110,6 +111,7 @@ def tables_of(mechanism: LogMechanism, refined: tuple[Quantity, ...] = ()) -> Ta
             "kappa": Column("1", "f8", "identifiability of p[0]: 1 - R^2, 0 to 1"),
             "residual": Column("1", "f8", "standard deviation of a row's residual over the one it was configured with"),
             "reason": Column("", "U24", "reason of the last group of rows"),
+            "standing": Column("", "U80", "whether the published estimate still holds"),
         },
         "status": _STATUS,
         "events": _EVENTS,
@@ -297,7 +299,8 @@ class Values:
         numbers["kappa"] = item.kappa / item.FULL_KAPPA
         numbers["residual"] = item.residual_sd / self._row_sd
         reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)
-        return self._one("estimates", record, **{**numbers, "updates": item.updates, "reason": reason})
+        words = {"updates": item.updates, "reason": reason, "standing": standing_text(item.standing)}
+        return self._one("estimates", record, **{**numbers, **words})
 
     @np.errstate(all="ignore")
     def _refined(self, record: Record, item: RefinedEstimate) -> Rows:

@@ -33,6 +33,7 @@ from pvid.compare.bits import Difference
 from pvid.core.model_library import compiled_by
 from pvid.link.frames import (
     MAX_P,
+    NO_STANDING,
     Configuration,
     Configure,
     ConfigureQ31,
@@ -515,6 +516,8 @@ class _Recomputation:
         for name in ("kappa", "residual_sd", "weight"):
             yield name.replace("_", " "), _word(getattr(check, name)), _word(own[name])
         yield "updates", check.updates, witness.updates
+        if check.standing != NO_STANDING:
+            yield "standing", check.standing, own["standing"]
         yield "status", check.reason, witness.verdict
 
     def _compared_refined(self, check: RefinedEstimate, witness: Witness) -> Iterator[tuple[str, int, int]]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pvid.core.headers import Placed
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.settings.enums import Reason, Stage
+from pvid.settings.record import standing_word
 from pvid.twin.printed import PrintedTwin
 
 Samples = npt.NDArray[Any]
@@ -122,6 +123,7 @@ class Witness:
     def _fields(self, estimate: Any) -> Mapping[str, Any]:
         found = {name: _of(estimate, name) for name in ("p", "se", "kappa", "residual_sd", "weight")}
         matrix = np.array(_of(estimate, self.matrix))
+        found["standing"] = standing_word(_of(estimate, "standing"))
         return found | {self.matrix: np.reshape(matrix, (len(found["p"]), -1))}
 
     def refined(self) -> Refined | None:

@@ -9,7 +9,7 @@ from pvid.base.errors import PvidError
 from pvid.link.frames import Code, Core, Form, Hello, Names, Status
 from pvid.log.mechanism import mechanism_named
 from pvid.log.reader import Account
-from pvid.settings.enums import Reason, Stage
+from pvid.settings.enums import Doubt, Reason, Stage
 from pvid.settings.forms import FORMS
 
 _REASONS = {
@@ -35,6 +35,22 @@ _REASONS = {
 # What the core publishes (trust.h), and what a good drive reaches (theory.md 4).
 KAPPA_MIN, KAPPA_WEAK, KAPPA_GOOD = 3e-5, 1e-3, 5e-3
 _KAPPA_SHOWN = (1e-6, 1.0)
+
+
+_DOUBTS = {
+    Doubt.CONTRADICTED: "the present data give another one",
+    Doubt.GREW: "its standard errors have grown",
+    Doubt.MISFIT: "residuals exceed the sensors' noise",
+    Doubt.REJECTS: "many windows are rejected as outliers",
+    Doubt.CHANGED: "the mechanism has changed",
+}
+
+
+def standing_words(standing: str) -> str:
+    """Whether the published estimate still holds, and why not, from the words of the table (record.standing_text)."""
+    for cause, words in _DOUBTS.items():
+        standing = standing.replace(cause.text, words)
+    return standing
 
 
 def stage_words(stage: str, reason: str) -> str:

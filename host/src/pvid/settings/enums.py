@@ -103,6 +103,25 @@ class Stage(_Named):
     REFINED = 1
 
 
+class Standing(_Named):
+    """Whether a published estimate still holds (pvid_standing_state)."""
+
+    NONE = 0
+    VALID = 1
+    DOUBTED = 2
+    WITHDRAWN = 3
+
+
+class Doubt(_Named):
+    """Why it is doubted or withdrawn, one bit each (pvid_doubt)."""
+
+    CONTRADICTED = 1
+    GREW = 2
+    MISFIT = 4
+    REJECTS = 8
+    CHANGED = 16
+
+
 class Law(_Named):
     """How the estimate follows the data (pvid_law)."""
 

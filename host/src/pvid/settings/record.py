@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.settings.enums import Doubt, Standing
+
 Array = npt.NDArray[Any]
+_STANDING = ("age", "state", "causes")
 Bytes = npt.NDArray[np.uint8]
 
 # Types of p and of the sums in the bytes that the running hash covers, by numpy's kind of number.
@@ -38,6 +41,8 @@ class Record:
         Of the sums [ticks] in fixed point; else empty.
     published, published_se
         The weak form's published p and its standard errors [ticks, n_p]; else empty.
+    standing
+        Of the published estimate (pvid/standing.h): age + 2^16 state + 2^24 causes, uint32 [ticks]; else empty.
     hash
         Running hash after each tick, uint32 [ticks]; empty if it was not requested.
     estimate
@@ -51,6 +56,7 @@ class Record:
     exponent: npt.NDArray[np.uint8] = _none(np.uint8)
     published: Array = _none(np.float32)
     published_se: Array = _none(np.float32)
+    standing: npt.NDArray[np.uint32] = _none(np.uint32)
     hash: npt.NDArray[np.uint32] = _none(np.uint32)
     estimate: npt.NDArray[np.void] = _none(np.void)
 
@@ -74,3 +80,20 @@ class Record:
         if self.is_fixed:
             pieces.insert(2, self.exponent.astype("<u4")[:, None])
         return np.concatenate([np.ascontiguousarray(piece).view(np.uint8) for piece in pieces], axis=1)
+
+
+def standing_word(one: Any) -> int:
+    """Of a standing (a printed struct, or a record of numpy) that of `standing`."""
+    age, state, causes = (int(one[name] if isinstance(one, np.void) else getattr(one, name)) for name in _STANDING)
+    return age + (state << 16) + (causes << 24)
+
+
+def standing_text(word: int) -> str:
+    """An entry of `standing` in words: "doubted (grew, misfit), 3 windows old"; empty for one that does not exist."""
+    if word >> 16 & 0xFF not in list(Standing):
+        return ""
+    state, causes, age = Standing(word >> 16 & 0xFF), word >> 24, word & 0xFFFF
+    names = [one.text for one in Doubt if one & causes]
+    because = f" ({', '.join(names)})" if names else ""
+    old = f", {age} window{'s' if age > 1 else ''} old" if age and state != Standing.NONE else ""
+    return state.text + because + old

@@ -31,6 +31,7 @@ from pvid.log.words import (
     received_words,
     residual_words,
     stage_words,
+    standing_words,
 )
 from pvid.show.axis_limits import interesting
 from pvid.show.live_simulation import LiveSimulation
@@ -112,6 +113,7 @@ class LiveState(threading.Thread):
             "lost": loss_words(account) + (f"; {self._failed} records cannot be shown" if self._failed else ""),
             "reason": history.reason,
             "reasonWords": reason_words(history.reason),
+            "standing": standing_words(history.standing),
             "stage": stage_words(history.stage, history.refined_reason),
             "kappa": f"{kappa:.2g}, {kappa_words(kappa)}" if newest else "",
             "kappaShare": kappa_share(kappa),

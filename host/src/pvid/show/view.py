@@ -31,6 +31,7 @@ from pvid.log.words import (
     received_words,
     residual_words,
     stage_words,
+    standing_words,
 )
 
 _PERIOD_S = 0.25
@@ -153,6 +154,8 @@ class LiveView:
             rows.add_row("motion", f"{', '.join(spans)} ({t[-1] - t[0]:.0f} s)")
         rows.add_row("state", Text(history.reason or "no estimate yet", style="bold"))
         rows.add_row("", Text(reason_words(history.reason), style="dim"))
+        if history.standing:
+            rows.add_row("estimate", Text(standing_words(history.standing)))
         if history.stage:
             rows.add_row("published", Text(stage_words(history.stage, history.refined_reason)))
         return rows

@@ -19,7 +19,7 @@ from pvid.core.model_library import NATIVE, ModelSources, core_of
 from pvid.core.refusals import refused
 from pvid.core.sources import FOLDERS, public_headers
 from pvid.settings.enums import Reason, Stage, Status
-from pvid.settings.record import Record
+from pvid.settings.record import Record, standing_word
 from pvid.settings.refine import RefineConfig
 from pvid.twin import fnv
 from pvid.twin.printer.program import printed_module
@@ -195,6 +195,7 @@ class PrintedTwin:
         watched = (
             _Watched(self._of_core),
             _Watched(self._of_published),
+            _Watched(self._of_standing),
             _Watched(self._of_second),
             _Watched(self._latest),
         )
@@ -207,9 +208,10 @@ class PrintedTwin:
                 reasons[tick] = step(state, flat[tick * width : (tick + 1) * width])
                 places[0, tick] = watched[0].place(lists, information.exponent if self.fixed else 0)
                 places[1, tick] = watched[1].place([], state.trust.mark.version)
+                places[2, tick] = watched[2].place([], state.trust.mark.version)
                 if second is not None:
-                    places[2, tick] = watched[2].place(of_second, second.level)
-                    places[3, tick] = watched[3].place([], (second.mark.version, second.mark.number[0]))
+                    places[3, tick] = watched[3].place(of_second, second.level)
+                    places[4, tick] = watched[4].place([], (second.mark.version, second.mark.number[0]))
                     told[tick] = self.module.pvid_refine_reason_f32(second)
                 if progress is not None and tick % _PROGRESS_TICKS == 0:
                     progress(tick)
@@ -243,6 +245,9 @@ class PrintedTwin:
     def _of_published(self) -> list[Any]:
         return [*self.estimate.p[: self.n_p], *self.estimate.se[: self.n_p]]
 
+    def _of_standing(self) -> list[int]:
+        return [standing_word(self.estimate.standing)]
+
     def _latest(self) -> list[Any]:
         one = self.refined
         return [np.float32(0)] * (2 * len(self.refinement.linear)) if one is None else [*one.r, *one.se]
@@ -258,10 +263,10 @@ class PrintedTwin:
         words, shown = watched[0].at(places[0], np.uint32), watched[1].at(places[1], number)
         hashed = [words, reasons[:, None].astype(np.uint32)]
         if self.refinement is not None:
-            latest = watched[3].at(places[3], np.float32)
+            latest = watched[4].at(places[4], np.float32)
             half = latest.shape[1] // 2
             self.second = SecondStage(told, latest[:, :half], latest[:, half:])
-            hashed += [watched[2].at(places[2], np.uint32), told[:, None].astype(np.uint32)]
+            hashed += [watched[3].at(places[3], np.uint32), told[:, None].astype(np.uint32)]
         hashes = fnv.of_words(np.concatenate(hashed, axis=1), self.running_hash)
         self.running_hash = int(hashes[-1]) if len(hashes) else self.running_hash
         sums = np.ascontiguousarray(words[:, self.n_p : words.shape[1] - self.fixed])
@@ -272,6 +277,7 @@ class PrintedTwin:
             exponent=words[:, -1].astype(np.uint8) if self.fixed else np.empty(0, np.uint8),
             published=shown[:, : self.n_p],
             published_se=shown[:, self.n_p :],
+            standing=watched[2].at(places[2], np.uint32)[:, 0],
             hash=hashes,
         )
 

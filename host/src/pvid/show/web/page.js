@@ -213,6 +213,8 @@ function drawWords(state) {
   say("lost", state.lost || "nothing", state.lost ? "bad" : "good");
   say("reason", state.reason || "no estimate yet");
   say("reasonWords", state.reasonWords, "quiet");
+  for (const one of ["standingName", "standing"]) place(one).hidden = !state.standing;
+  say("standing", state.standing, /^(doubted|withdrawn)/.test(state.standing) ? "bad" : "good");
   for (const one of ["stageName", "stage"]) place(one).hidden = !state.stage;
   say("stage", state.stage);
   say("kappa", state.kappa);
