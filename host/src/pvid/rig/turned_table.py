@@ -44,7 +44,7 @@ class _Long(NamedTuple):
 def turned(blocks_of: Callable[[], Iterator[bytes]]) -> Turned | None:
     """A text table whose blocks of lines begin anew at every call; None where it is not turned."""
     lines = list(_lines(next(blocks_of(), b"")))
-    for separator in SEPARATORS:
+    for separator in SEPARATORS if lines else ():
         rows = [split(one, separator) or [""] for one in lines]
         if (long := _long(rows, separator)) is not None:
             what = f"a row for each signal and time ({', '.join(long.names[:8])}): read as a column for each signal"
