@@ -75,6 +75,13 @@ CASES = (
         usual=("kapitza", "rigid_body"),
     ),
     Case(
+        "standing",
+        "Whether published estimates still hold: imperfect motors, clean runs, sensors stuck or unplugged.",
+        "standing",
+        ("standing-imperfections", "standing-clean", "standing-accidents"),
+        (*_SEEDS, option("--seconds", 20, "Of a run."), option("--longest", 120, "Longest accident [s].")),
+    ),
+    Case(
         "longevity",
         "Millions of ticks of every disturbance, with and without forgetting.",
         "longevity",
