@@ -179,7 +179,7 @@ def accidents_of(own: Board, samples: npt.NDArray[np.float32], seed: int, longes
     random, rate = np.random.default_rng([seed, 7]), own.simulation.rig.sample_rate
     first = int((_BEFORE_S + random.uniform(0, 5)) * rate)
     last = first + int(np.exp(random.uniform(np.log(0.03), np.log(longest_s))) * rate)
-    one, some = int(random.integers(samples.shape[1])), random.random(samples.shape[1]) < 0.5
+    one, some = int(random.integers(samples.shape[1])), np.asarray(random.random(samples.shape[1]) < 0.5)
     for place in np.flatnonzero(some) if some.any() else [one]:
         top = float(np.abs(samples[:, place]).max())
         values = 0.0, top, random.uniform(-top, top), samples[first, place]
