@@ -1,4 +1,4 @@
-"""Parameters that drift along given directions alone: the C core against the batch problem that it stands for, and a
+"""Parameters that drift along given directions alone: the C core against the batch problem that it solves, and a
 motor whose winding heats."""
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ static void test_the_projected_equations_give_the_constrained_least_squares(void
     for (size_t a = 0; a < 3u; a++) {
         assert_true((a == free) || ((force[a] == 0.0f) && (s[a][a] == 0.0f)));
     }
-    float dp[3] = {9.0f, 9.0f, 9.0f}; /* what stands for the dependent ones does not matter */
+    float dp[3] = {9.0f, 9.0f, 9.0f}; /* those of the dependent parameters are overwritten */
     dp[free] = force[free] / s[free][free];
     pvid_constraints_complete_f32(&ties, 3, dp);
     assert_true(fabsf(g[0] + (g[1] * dp[0]) + (g[2] * dp[1])) < 1.0e-5f);

@@ -6,6 +6,7 @@
 
 #include "number/finite_f32.h"
 #include "number/unroll.h"
+#include "pvid/elementary.h"
 
 #if PVID_MAX_CONSTRAINTS > 0
 
@@ -19,11 +20,6 @@
 
 /* A constraint is met within this part of a large step. */
 #define MET 1.0e-4f
-
-static float magnitude(float x)
-{
-    return pvid_from_bits_f32(pvid_bits_f32(x) & 0x7FFFFFFFu);
-}
 
 /* A large step of a parameter: itself where positive, else start_sd. */
 static float reach_of(const pvid_solve_settings_f32 *settings, const float p[], size_t a)
@@ -45,7 +41,8 @@ static float largest(const pvid_constraints_f32 *self, size_t m, size_t n, float
     float most = 0.0f;
     for (size_t k = self->count; k < m; k++) {
         for (size_t a = 0; a < n; a++) {
-            const float size = is_dependent(self, a) ? 0.0f : ((magnitude(rows[k][1u + a]) * weight[a]) / length[k]);
+            const float size =
+                is_dependent(self, a) ? 0.0f : ((pvid_magnitude_f32(rows[k][1u + a]) * weight[a]) / length[k]);
             if (size > most) {
                 most = size;
                 *row = k;
@@ -107,10 +104,10 @@ PVID_COLD void pvid_constraints_at_f32(pvid_constraints_f32 *self, const pvid_mo
             rows[k][a] = flat[(k * (n + 1u)) + a];
         }
         for (size_t a = 0; a < n; a++) {
-            const float size = magnitude(rows[k][1u + a]) * reach_of(settings, p, a);
+            const float size = pvid_magnitude_f32(rows[k][1u + a]) * reach_of(settings, p, a);
             length[k] = (size > length[k]) ? size : length[k];
         }
-        self->off += magnitude(rows[k][0]) / length[k];
+        self->off += pvid_magnitude_f32(rows[k][0]) / length[k];
     }
     size_t row = 0;
     size_t column = 0;

@@ -123,10 +123,11 @@ def watch(folder: Path, every: int, **given: Any) -> int:
             seen = files
             for row in new:
                 click.echo(f"{row.path}: {row.failure or row.verdict}")
-            for alarm in alarms_of(fleet) if fleet else ():
+            alarms = alarms_of(fleet) if fleet else []
+            for alarm in alarms:
                 if alarm not in told:
                     click.echo(f"changed: {alarm}")
-            told |= set(alarms_of(fleet)) if fleet else set()
+            told.update(alarms)
     except KeyboardInterrupt:
         click.echo(f"rows: {job.out}; page: {job.page}" if fleet else f"{folder}: no recording came")
     return NOTHING_IDENTIFIED if fleet is None else _code(fleet)
@@ -215,14 +216,15 @@ def _settled(folder: Path, job: _Job, every: int) -> Iterator[dict[str, tuple[in
     from pvid.log.rig import LOG_SUFFIX
     from pvid.rig.run import SUFFIXES
 
-    own = [path.resolve() for path in (job.out, *([Path(job.question.reports)] if job.question.reports else []))]
+    own = {Path(one).resolve() for one in (job.out, job.question.reports) if one is not None}
     before: dict[str, tuple[int, int]] = {}
     while True:
         now: dict[str, tuple[int, int]] = {}
         for path in folder.rglob("*"):
             if not path.name.lower().endswith((LOG_SUFFIX, *SUFFIXES)) or not path.is_file():
                 continue
-            if any(path.resolve() == one or one in path.resolve().parents for one in own):
+            whole = path.resolve()
+            if not own.isdisjoint([whole, *whole.parents]):
                 continue
             at = path.stat()
             now[str(path)] = (at.st_size, at.st_mtime_ns)

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeVar
+from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,6 @@ from scipy.stats import t as student
 from pvid.fleet.row import Row
 
 Float = npt.NDArray[np.float64]
-Item = TypeVar("Item")
 
 FALSE_ALARMS = 0.01  # probability that anything is named in a fleet in which nothing changes
 _FEWEST = 4  # recordings whose own scatter is compared with
@@ -91,7 +91,7 @@ class Series:
                 continue
             inner = [start, *(one for one in found if start < one < end), end]
             marks |= set(inner)
-            todo += _pairs(inner)
+            todo += pairwise(inner)
         return tuple(sorted([*self._steps(sorted(marks)), *trends], key=lambda one: one.start))
 
     def _best(self, start: int, end: int) -> tuple[int, int] | Change | None:
@@ -139,8 +139,8 @@ class Series:
 
     def _steps(self, marks: Sequence[int]) -> Iterator[Change]:
         """Between the stretches that begin at `marks`."""
-        means = [float(np.average(self.value[a:b], weights=self.noise[a:b] ** -2.0)) for a, b in _pairs(marks)]
-        for mark, (before, after) in zip(marks[1:-1], _pairs(means), strict=True):
+        means = [float(np.average(self.value[a:b], weights=self.noise[a:b] ** -2.0)) for a, b in pairwise(marks)]
+        for mark, (before, after) in zip(marks[1:-1], pairwise(means), strict=True):
             yield Change("step", float(self.t[mark - 1]), float(self.t[mark]), before, after)
 
     @property
@@ -154,10 +154,6 @@ class Series:
         scatter = float(w @ (v - mean) ** 2) / max(1, v.size - 1)
         shared = float(np.sqrt(np.maximum(0.0, self.apart[since] ** 2 - 1 / w)).min())
         return mean, float(np.hypot((max(1.0, scatter) / w.sum()) ** 0.5, shared))
-
-
-def _pairs(of: Sequence[Item]) -> list[tuple[Item, Item]]:
-    return list(zip(of, of[1:], strict=False))
 
 
 def series_of(rows: Sequence[Row]) -> list[Series]:

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -73,6 +74,16 @@ class Fleet:
         found["logs that are not equal"] = sum(row.verified not in (None, EQUAL) for row in self.rows)
         return {name: count for name, count in found.items() if count}
 
+    @cached_property
+    def shared(self) -> Mapping[str, tuple[str, int]]:
+        """Warnings of most recordings that have an answer, without their numbers: the first one, and how many."""
+        kinds: dict[str, list[str]] = {}
+        for row in self.rows:
+            for kind, own in {_kind(one): one for one in _warnings(row)}.items():
+                kinds.setdefault(kind, []).append(own)
+        answered = sum(row.verdict is not None for row in self.rows)
+        return {kind: (own[0], len(own)) for kind, own in kinds.items() if len(own) > max(1, _SHARED * answered)}
+
 
 def sentence(series: Series, change: Change) -> str:
     """What changed, as "motors/b3: R rose by 10 % (1.200 to 1.320 ohm) between 3 and 4 November 2026"."""
@@ -107,7 +118,7 @@ def page(fleet: Fleet, command: str, folder: Path | None = None, *, refresh: int
         "the errors of scale that all recordings have in common.</p>",
         _means(fleet),
         "<h2>Recordings</h2>",
-        _recordings(fleet.rows, folder or Path()),
+        _recordings(fleet, folder or Path()),
         f'<p class="quiet">{text(command)}</p>',
     ]
     return document(fleet.title, "".join(parts), refresh=refresh)
@@ -138,11 +149,10 @@ def _common(fleet: Fleet) -> Iterator[str]:
         ]
         if scales and (scale := float(np.median(scales))) > 0:
             lines.append(f"{name} {percent(scale)}")
-    shared = _shared(fleet.rows)
-    if not lines and not shared:
+    if not lines and not fleet.shared:
         return
     yield "<h2>What all recordings have in common</h2><ul>"
-    for first, count in shared.values():
+    for first, count in fleet.shared.values():
         yield f"<li>{text(first)} (alike in {count} of {len(fleet.rows)} recordings)</li>"
     if lines:
         yield (
@@ -150,16 +160,6 @@ def _common(fleet: Fleet) -> Iterator[str]:
             "They are the same before and after a change.</li>"
         )
     yield "</ul>"
-
-
-def _shared(rows: Sequence[Row]) -> dict[str, tuple[str, int]]:
-    """Warnings of most recordings that have an answer, without their numbers: the first one, and how many."""
-    kinds: dict[str, list[str]] = {}
-    for row in rows:
-        for kind, own in {_kind(one): one for one in _warnings(row)}.items():
-            kinds.setdefault(kind, []).append(own)
-    answered = sum(row.verdict is not None for row in rows)
-    return {kind: (own[0], len(own)) for kind, own in kinds.items() if len(own) > max(1, _SHARED * answered)}
 
 
 def _warnings(row: Row) -> list[str]:
@@ -201,12 +201,12 @@ def _scale(series: Sequence[Series]) -> tuple[str, float]:
     return (unit, scale) if -3 < power < 5 else (f"1e{power} {unit}".strip(), scale * 10.0**power)
 
 
-def _recordings(rows: Sequence[Row], folder: Path) -> str:
-    lines, shared = [], _shared(rows)
-    for row in rows:
+def _recordings(fleet: Fleet, folder: Path) -> str:
+    lines = []
+    for row in fleet.rows:
         words = [row.failure or (None if row.identified else row.status)]
-        words += [one for one in _warnings(row) if _kind(one) not in shared]
-        words += ["as of all"] if any(_kind(one) in shared for one in _warnings(row)) else []
+        words += [one for one in _warnings(row) if _kind(one) not in fleet.shared]
+        words += ["as of all"] if any(_kind(one) in fleet.shared for one in _warnings(row)) else []
         words += [row.verified] if row.verified not in (None, EQUAL) else []
         name = text(row.path)
         if row.report is not None:
