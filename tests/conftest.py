@@ -48,9 +48,9 @@ SLOW = """
     twin/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
     twin/runs_begin oracle/scale identification/refined_length board/generated twin/refinement codegen/refine
     core/dropped_calls sim/rigs core/bad_config bench/longevity core/model_library core/equation_error tools/docs
-    identification/wild_samples board/port bench/strong_mechanisms cli/output tools/proofs log/untrusted
+    identification/wild_samples board/port cli/output tools/proofs log/untrusted
     show/pictures tools/loops oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random
-    bench/hard bench/verifying log/export log/text_table core/dead_zone tools/mutate bench/model_boards
+    bench/hard log/export log/text_table core/dead_zone tools/mutate bench/model_boards
     deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
     design/differentiation identification/following codegen/fitted_sizes identification/gallery bench/cell
     sim/pendulum oracle/weak_segments base/packages core/snapshot_weak oracle/failures rig/former_files oracle/zero

@@ -56,8 +56,7 @@ unlock() { exec 9>&-; }
 
 # The packages of PROFILE that are missing, judged by what they bring, so that a tool installed in another way
 # counts. Profiles: python (to make the environment), pvid (to run), demo (to build for the Cortex-M boards and emulate
-# them besides), targets (the same for every board), test (to test, all of that and more), cycles (to simulate a core from
-# its RTL).
+# them besides), targets (the same for every board), test (to test, all of that and more).
 missing_packages() {
     local missing=()
     need() { # need PACKAGE CHECK...
@@ -79,12 +78,6 @@ missing_packages() {
         need libc6-dev test -e /usr/include/stdio.h
         need cmake command -v cmake
         need ninja-build command -v ninja
-    fi
-    if [[ $1 == cycles ]]; then
-        need verilator command -v verilator
-        need g++ command -v g++
-        need make command -v make
-        need gcc-riscv64-unknown-elf command -v riscv64-unknown-elf-gcc
     fi
     if [[ $1 == test || $1 == targets || $1 == demo ]]; then
         # No C library for ARM and RISC-V: firmware/ports does without.

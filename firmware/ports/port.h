@@ -37,7 +37,6 @@ size_t pvid_port_send(const uint8_t bytes[], size_t n);
  *   Cortex-M in QEMU      SysTick under -icount shift=8: instructions  2.6 million (netduinoplus2: 390 000,
  *                         (a core on silicon: its clock cycles)        microbit: 4 million)
  *   RISC-V virt           minstret under -icount shift=0: instructions 4 thousand million
- *   CV32E40P in verilator mcycle: clock cycles                         4 thousand million
  *   AVR in simavr         timer 1: clock cycles                        4 thousand million
  *
  * The call itself costs about 10 instructions, some of which are in the difference: measure two calls in a row and

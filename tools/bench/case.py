@@ -102,3 +102,20 @@ class Case:
         return Report(
             [(name, getattr(found, of), getattr(found, rows)(*given.values())) for name, of, rows in self.rows]
         )
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """A measurement that is not made again.
+
+    Attributes
+    ----------
+    name : of its command, at the commit in the heads of its tables
+    claim, tables : as those of a case
+    holder : the test of what the claim still promises of the code of today; none where it compares with others
+    """
+
+    name: str
+    claim: str
+    tables: tuple[str, ...]
+    holder: str = "frozen"

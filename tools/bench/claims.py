@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from bench.case import Case, columns
+from bench.case import Case, Frozen, columns
+from bench.figures import results_of
 from pvid.core.sources import ROOT
 
 HEADER = columns("claim | command | tables | quoted by | short form")
@@ -54,8 +55,12 @@ def short_form(place: str) -> str:
     return next((str(path.relative_to(ROOT)) for path in found), "-")
 
 
-def rows(cases: tuple[Case, ...]) -> Iterator[tuple[str, ...]]:
+def rows(cases: tuple[Case, ...], frozen: tuple[Frozen, ...]) -> Iterator[tuple[str, ...]]:
     """As in HEADER."""
     known = [(one.claim, f"bench {one.name}", files_of(one), short_form(one.place)) for one in cases]
     for claim, command, tables, test in [*known, *((a, b, [*c], d) for a, b, c, d in _OTHERS)]:
         yield claim, command, " ".join(tables) or "-", " ".join(quoting(command, tables)), test
+    for once in frozen:
+        made = results_of(once.tables[0]).made
+        command = f"{made['command'].removeprefix('./tools/pvid ')} at {made['commit']}"
+        yield once.claim, command, " ".join(once.tables), " ".join(quoting(command, [*once.tables])), once.holder

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bench.case import DIFFERS, Case, option
+from bench.case import DIFFERS, Case, Frozen, option
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.board.boards import BOARDS
 from pvid.cli.page_table import UPDATE, put_table
@@ -87,42 +87,6 @@ CASES = (
         "longevity",
         options=_number("--ticks", 1_000_000, "Of each run."),
         rows=(("longevity", "HEADER", "rows"),),
-    ),
-    Case(
-        "verify",
-        "What `pvid verify` takes for a long log, of each identifier that a board streams.",
-        "verifying",
-        options=_number("--ticks", 3_600_000, "Of each log."),
-        rows=(("verify", "HEADER", "rows"),),
-        usual=("kapitza", "dc_motor", "furuta", "battery_2rc"),
-    ),
-    Case(
-        "compare-methods",
-        "Weak form, strong form, output error and pysindy's weak form (needs pysindy).",
-        "methods",
-        options=_number("--seeds", 3),
-        rows=(("compare-methods", "HEADER", "rows"),),
-    ),
-    Case(
-        "strong-mechanisms",
-        "The strong form on boards: its bits and the cost of a tick.",
-        "strong_mechanisms",
-        options=_ONCE,
-        rows=(("strong-mechanisms", "HEADER", "rows"),),
-    ),
-    Case(
-        "strong-fixed",
-        "The same of the strong form in fixed point.",
-        "strong_mechanisms",
-        options=_ONCE,
-        rows=(("strong-fixed", "FIXED_HEADER", "fixed_rows"),),
-    ),
-    Case(
-        "cycles",
-        "Clock cycles of a tick on a real core, CV32E40P, simulated from its RTL by verilator with ideal memory.",
-        "cycles",
-        ("cycles",),
-        (_PROCESSES,),
     ),
     Case(
         "missing",
@@ -286,6 +250,33 @@ CASES = (
     ),
 )
 
+# Measured once: the tables stay, the code is in the history, at the commit in their heads.
+FROZEN = (
+    Frozen(
+        "compare-methods",
+        "Weak form, strong form, output error and pysindy's weak form on the same runs.",
+        ("compare-methods",),
+    ),
+    Frozen(
+        "cycles",
+        "Clock cycles of a tick on a real core, CV32E40P, simulated from its RTL by verilator with ideal memory.",
+        ("cycles",),
+        "tests/board/test_targets.py",  # the instructions of a tick
+    ),
+    Frozen(
+        "strong-mechanisms",
+        "The strong form on boards: its bits, the cost of a tick, recursive least squares beside it.",
+        ("strong-mechanisms", "strong-fixed"),
+        "tests/board/test_strong_image.py",
+    ),
+    Frozen(
+        "verify",
+        "What `pvid verify` takes for a long log, of each identifier that a board streams.",
+        ("verify",),
+        "tests/log/test_witness.py",
+    ),
+)
+
 
 def _add(one: Case) -> None:
     @bench.command(name=one.name, help=one.claim, params=[*one.options])
@@ -319,7 +310,7 @@ def bench_claims(data: Path | None) -> int:
     """Which command holds which claim: its tables, the pages that quote them, the test of its short form."""
     from bench import claims
 
-    put_results(data, "claims", claims.HEADER, claims.rows(CASES))
+    put_results(data, "claims", claims.HEADER, claims.rows(CASES, FROZEN))
     return DONE
 
 

@@ -1,4 +1,4 @@
-"""The page host/docs/benchmarks.md: six figures, and sentences with figures, from the tables of results beside it."""
+"""The page host/docs/benchmarks.md: five figures, and sentences with figures, from the tables of results beside it."""
 
 from __future__ import annotations
 
@@ -175,30 +175,12 @@ def of_cost() -> list[str]:
             f"longest; bytes: {row['bss']} of state, {row['stack bound']} of stack, {row['text']} of code, "
             f"{row['tables']} of tables."
         )
-    first, *_, last = [row for row in results_of("cycles").where() if "f32" in row["identifier"]]
-    lines.append(
-        f"- Clock cycles of a tick on a simulated CV32E40P: {first['mean']} ({first['identifier']}, {first['FPU']}) to "
-        f"{last['mean']} ({last['identifier']}, {last['FPU']}), {last['longest']} in the longest."
-    )
-    ticks = {
-        (core, name): int(row[name])
-        for core, board in (("f32", "RV32IMAFC (virt-rv32imafc)"), ("q31", "RV32IMAC (virt-rv32imac)"))
-        for row in results_of("model-boards").where(board=board, core=core)
-        for name in ("kapitza", "dc_motor")
-    }
-    cycles = [(row["identifier"].split(", "), int(row["mean"])) for row in results_of("cycles").where()]
-    ratios = [mean / ticks[core, name] for (_, core, name), mean in cycles]
-    lines.append(f"- Cycles per instruction there: {min(ratios):.1f} to {max(ratios):.1f}.")
     choices = results_of("build-choices")
     smallest = min(choices.where(), key=lambda row: int(row["text"]))
     lines.append(
         f"- Smallest build of the first stage: {smallest['text']} bytes of code, {smallest['mean']} instructions."
     )
-    played = [
-        row["bits"]
-        for name in ("model-boards", "strong-mechanisms", "strong-fixed")
-        for row in results_of(name).where()
-    ]
+    played = results_of("model-boards").column("bits")
     lines.append(
         f"- Bits: those of the PC in {played.count('equal')} of {len(played) - played.count('-')} rows of mechanisms "
         "on boards."
@@ -370,65 +352,6 @@ def of_robustness() -> list[str]:
     ]
 
 
-# ---- other methods
-
-
-def draw_methods(figure: Figure) -> None:
-    """The worst parameter of each method."""
-    axis = figure.subplots()
-    table = results_of("compare-methods")
-    names = _names(table.column("mechanism"))
-    for place, (method, start, label) in enumerate(_METHODS):
-        marker, colour = "osD^v"[place], (WEAK, "C1", REFINED, OTHER, BAD)[place]
-        rows = [row for row in table.where(method=method, **{"start off": start}) if row["worst parameter %"] != "-"]
-        axis.plot(
-            [names.index(row["mechanism"]) + 0.12 * (place - 2) for row in rows],
-            _numbers([row["worst parameter %"] for row in rows]),
-            marker,
-            color=colour,
-            alpha=0.8,
-            label=label,
-        )
-    axis.axhline(5.0, color="k", linewidth=0.8)
-    axis.set_xticks(range(len(names)), names, rotation=20)
-    axis.set_yscale("log")
-    axis.set_ylabel("worst parameter, %")
-    axis.set_ylim(1e-3, 1e4)
-    axis.legend(fontsize="small", ncols=2, loc="upper left")
-
-
-_METHODS = (
-    ("weak form (this project)", "+-50 %", "pvid, first stage, start up to 50 % off"),
-    ("strong form, best Savitzky-Golay filter", "none", "Derivatives, best of 12 filters"),
-    ("output error (scipy)", "1 %", "Output error, start 1 % off"),
-    ("output error (scipy)", "30 %", "Output error, start 30 % off"),
-    ("weak form of pysindy", "no start", "pysindy, weak form"),
-)
-
-
-def of_methods() -> list[str]:
-    """Sentences below the figure."""
-    table = results_of("compare-methods")
-    lines = []
-    for method, start, label in _METHODS:
-        rows = table.where(method=method, **{"start off": start})
-        ran = [row for row in rows if row["worst parameter %"] != "-"]
-        near = [tuple(map(int, row["runs with every parameter within 5 %"].split("/"))) for row in ran]
-        seconds = _numbers([row["s a run"] for row in ran])
-        lines.append(
-            f"- {label}: {len(ran)} of {len(rows)} mechanisms; within 5 % in {sum(one for one, _ in near)} of "
-            f"{sum(of for _, of in near)} runs; {min(seconds):.2g} to {max(seconds):.2g} s a run."
-        )
-    rows = table.where(method=_METHODS[2][0], **{"start off": "1 %"})
-    mine = {row["mechanism"]: _number(row["median parameter %"]) for row in table.where(method=_METHODS[0][0])}
-    better = [row["mechanism"] for row in rows if _number(row["median parameter %"]) < mine[row["mechanism"]]]
-    lines.append(
-        f"- Output error from 1 % off has a smaller median error than pvid's first stage on {len(better)} of "
-        f"{len(rows)}: {', '.join(f'`{one}`' for one in better)}."
-    )
-    return lines
-
-
 # ---- the page
 
 
@@ -467,7 +390,6 @@ PARTS = (
     Part("missing", (CAMPAIGNS[0],), draw_missing, of_missing, (9.0, 3.4)),
     Part("recordings", ("predictions", "kept-predictions"), draw_recordings, of_recordings),
     Part("robustness", ("accidents",), draw_robustness, of_robustness, (9.0, 4.6)),
-    Part("methods", ("compare-methods",), draw_methods, of_methods),
 )
 
 
