@@ -31,7 +31,7 @@ settings.load_profile("seeded")
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = """
-    cli/cli cli/identify_in_c cli/identify_run oracle/missing identification/refined_search bench/random_models
+    cli/cli cli/identify_in_c cli/identify_run oracle/missing identification/refined_search
     log/log show/page twin/weak_q31 identification/work board/memory identification/mechanism_advice
     codegen/strong_model cli/design_cost paper/paper cli/run_input bench/refine_mechanisms show/answer_figure
     show/report board/stream bench/attack cli/look deploy/commission identification/refined_answer
@@ -54,7 +54,7 @@ SLOW = """
     deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
     design/differentiation identification/following codegen/fitted_sizes identification/gallery bench/cell
     sim/pendulum oracle/weak_segments base/packages core/snapshot_weak oracle/failures rig/former_files oracle/zero
-    identification/weak_files_q31 bench/senseless_models model/mecanum core/weak_snapshot_q31
+    identification/weak_files_q31 model/mecanum core/weak_snapshot_q31
 """.split()
 # Of tests of every mechanism in bench.kinds those of these four: relaxations, an integral, an algebraic output; corners
 # and dry friction; an input that is a derivative; a hidden coordinate of order two. The others are tests of the night.

@@ -112,7 +112,7 @@ class Frozen:
     ----------
     name : of its command, at the commit in the heads of its tables
     claim, tables : as those of a case
-    holder : the test of what the claim still promises of the code of today; none where it compares with others
+    holder : the tests of what the claim still promises of the code of today; none where it compares with others
     """
 
     name: str

@@ -234,20 +234,6 @@ CASES = (
         ("long",),
         (click.Option(["--only"], metavar="ROOM", multiple=True, help="A folder of tests/; may be given again."),),
     ),
-    Case(
-        "random-models",
-        "Random rigs the whole road: check, identify in float64 and in C, refine, build, compile, equal bits; and "
-        "descriptions without sense, of which each is a report or one sentence.",
-        "random_models",
-        ("random-models", "compile-times", "senseless-models"),
-        (
-            option("--count", 2000, "Of rigs."),
-            option("--seed", 0, "Of the first rig.", least=0),
-            click.Option(
-                ["--resume"], is_flag=True, help="Continue behind the rigs of an earlier run of this seed on this code."
-            ),
-        ),
-    ),
 )
 
 # Measured once: the tables stay, the code is in the history, at the commit in their heads.
@@ -268,6 +254,13 @@ FROZEN = (
         "The strong form on boards: its bits, the cost of a tick, recursive least squares beside it.",
         ("strong-mechanisms", "strong-fixed"),
         "tests/board/test_strong_image.py",
+    ),
+    Frozen(
+        "random-models",
+        "Random rigs the whole road: check, identify in float64 and in C, refine, build, compile, equal bits; and "
+        "descriptions without sense, of which each is a report or one sentence.",
+        ("random-models", "compile-times", "senseless-models"),
+        "tests/identification/test_former_rigs.py tests/model/test_senseless.py tests/codegen/test_random.py",
     ),
     Frozen(
         "verify",

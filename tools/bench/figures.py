@@ -345,7 +345,7 @@ def of_robustness() -> list[str]:
         f"{sum(one['faults'] for one in years)} faults.",
         f"- `bench longevity`: {len(longevity.rows)} rows of a million ticks, {marked} cells silently wrong or not "
         "finite.",
-        f"- `bench random-models`, {rigs['rigs']} random rigs: {rigs['failures']} failures, {rigs['good']} with status "
+        f"- {rigs['rigs']} random rigs the whole road: {rigs['failures']} failures, {rigs['good']} with status "
         f"`good`, off by at most {rigs['largest of good']} s.e.; {senseless['models']} descriptions without sense: "
         f"{senseless['tracebacks']} tracebacks.",
         f"- `bench long`, the long tests: {long.count('passed')} of {len(long)} passed.",
