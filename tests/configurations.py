@@ -124,16 +124,18 @@ TRUST = {
     "trust.neglected": Range(0.0, 1.0, Status.BAD_NEGLECTED),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.revert_after": Range(0, 65535, Status.OK),
-    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
 }
+FORM = {"iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,))}
 WEAK = {
     **RIG_FIELDS,
     **ESTIMATOR,
     **TRUST,
+    **FORM,
 }
 WEAK_Q31 = {
     **ESTIMATOR_Q31,
     **TRUST,
+    **FORM,
     "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
     "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),

@@ -19,7 +19,7 @@ from pvid.model.corners import OfInput, with_corners
 from pvid.model.signals import Jet
 from pvid.models.mechanisms import compiled_of, described, names
 
-SHIPPED = {  # theta of each row kind, unknowns: evidence/models.md 4
+SHIPPED = {  # theta of each kind of row, unknowns
     "kapitza": ([8], 4),
     "dc_motor": ([4, 5], 7),
     "cart_pendulum": ([5, 4], 7),

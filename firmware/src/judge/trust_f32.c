@@ -265,6 +265,7 @@ PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason 
         !(candidate->least_pivot >= self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
+    /* too few windows, too large an error, not converged, or sums begun anew by the gate */
     if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !self->arrived ||
         self->standing.opened) {
         return PVID_HELD_UNCERTAIN;
