@@ -34,17 +34,17 @@ SLOW = """
     cli/cli cli/identify_in_c cli/identify_run oracle/missing identification/refined_search
     log/log show/page twin/weak_q31 identification/work board/memory identification/mechanism_advice
     codegen/strong_model cli/design_cost paper/paper cli/run_input bench/refine_mechanisms show/answer_figure
-    show/report board/stream bench/attack cli/look deploy/commission identification/refined_answer
+    show/report board/stream cli/mutants cli/look deploy/commission identification/refined_answer
     identification/refined_kinds oracle/samples
     board/ports board/profile core/standard_errors identification/refined_kernel base/subprocesses
-    identification/additions deploy/deploy twin/weak_f32 codegen/build bench/liar cli/demo_run identification/judge
+    identification/additions deploy/deploy twin/weak_f32 codegen/build log/liar cli/demo_run identification/judge
     tools/pages core/trust_q31 cli/api identification/scale_errors board/targets identification/own_mechanisms
     core/core_q31 identification/refined twin/second_stage show/view board/refined_board tools/wheel
     board/strong_image cli/several board/mechanism_board board/field core/read_while_stepping cli/foreign_files
     identification/several_recordings fleet/batch board/refined_stream codegen/generated_q31 bench/mechanisms
     cli/readme log/verify log/witness oracle/weak_in_c board/weak_boards core/weak_rows_q31 core/arithmetic_options
     codegen/weak_c core/recorded_hashes oracle/feedback codegen/generated_f32 oracle/weak_identify
-    bench/accidents core/sizes_agree twin/state bench/year tools/notebooks oracle/corners model/elimination
+    bench/accidents core/sizes_agree twin/state tools/notebooks oracle/corners model/elimination
     twin/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
     twin/runs_begin oracle/scale identification/refined_length board/generated twin/refinement codegen/refine
     core/dropped_calls sim/rigs core/bad_config bench/longevity core/model_library core/equation_error tools/docs
@@ -52,7 +52,7 @@ SLOW = """
     show/pictures tools/loops oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random
     bench/hard log/export log/text_table core/dead_zone tools/mutate bench/model_boards
     deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
-    design/differentiation identification/following codegen/fitted_sizes identification/gallery bench/cell
+    design/differentiation identification/following codegen/fitted_sizes identification/gallery
     sim/pendulum oracle/weak_segments base/packages core/snapshot_weak oracle/failures rig/former_files oracle/zero
     identification/weak_files_q31 model/mecanum core/weak_snapshot_q31
 """.split()

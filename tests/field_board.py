@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from lying_board import estimate_of
 from pendulum_plant import simulate, standard_sensors
 from pendulum_run import Run
 
-from bench.liar_board import estimate_of
 from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number

@@ -10,9 +10,9 @@ import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from lying_board import LyingBoard
 
 import pvid
-from bench.liar_board import LyingBoard
 from pvid.base.errors import PvidError
 from pvid.cli.main import GROUPS, commands
 from pvid.log.file import LogWriter

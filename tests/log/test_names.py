@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lies import NAMED
+from lying_board import PER_FRAME, LyingBoard, message
 
-from bench.liar_board import PER_FRAME, LyingBoard, message
-from bench.lies import NAMED
 from pvid.base.errors import PvidError
 from pvid.link import frames as link
 from pvid.link.names import BoardNames, Quantity

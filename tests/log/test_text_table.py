@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from lying_board import LyingBoard
 from pendulum_run import columns_of
 
-from bench.liar_board import LyingBoard
 from pvid.base.console import DIFFERENT, DONE
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands

@@ -24,10 +24,10 @@ import pytest
 import serial
 import uvicorn
 from click.testing import CliRunner
+from lies import Behaviour
+from lying_board import TICKS, Flood, LyingBoard, Pause, Step, message
+from rehearsal import RehearsedSource
 
-from bench.liar import RehearsedSource
-from bench.liar_board import TICKS, Flood, LyingBoard, Pause, Step, message
-from bench.lies import Behaviour
 from pvid.base.errors import PvidError
 from pvid.board.target import Target
 from pvid.cli.log import print_account

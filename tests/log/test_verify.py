@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,25 @@ import pytest
 from program import pvid
 
 from pvid.base.errors import PvidError
-from pvid.board.mechanism_board import MechanismBoard, board_of
+from pvid.base.toml_text import toml_document
+from pvid.board.mechanism_board import MechanismBoard, board_of, board_of_guess
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
-from pvid.board.target import HOST_TARGET
+from pvid.board.stream_image import settings_number
+from pvid.board.target import HOST_TARGET, open_target
 from pvid.cli.verify import command as verify
 from pvid.link import frames as link
+from pvid.link.frames import Source
+from pvid.log.export import export_log
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogReader
-from pvid.log.rig import settings_text_of_log
+from pvid.log.recorder import EmulatorSource, Logger
+from pvid.log.rig import mechanism_in, settings_text_of_log
 from pvid.log.values import Values
 from pvid.log.verify import ReplayableBoard, Stretch, Verdict, Verifier
+from pvid.settings.cores import CORES
+from pvid.settings.enums import Core
+from pvid.show.log_figure import write_log_figure
+from pvid.show.page_state import LiveState
 
 TICKS = 6400
 LONG = pytest.mark.long
@@ -211,6 +221,41 @@ def test_a_count_that_passes_2_to_the_32_is_no_restart(tmp_path: Path, counted: 
     ticks = [record.tick for record in reader if isinstance(record.item, link.Raw | link.Estimate)]
     assert ticks == sorted(ticks) and ticks[-1] == first + 3200
     assert (reader.account.restarts, reader.account.missing_samples) == (0, 0)
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_the_firmware_and_all_that_reads_its_log_count_on_beyond_2_to_the_32(tmp_path: Path, core: Core) -> None:
+    """Samples on both sides of a passage, of the first and of one 95 years later; exported and drawn."""
+    board, log, every = board_of_guess(field_board.rig(), core), tmp_path / "a.pvlog", 100
+    mechanism = mechanism_in(toml_document(board.text()))
+    assert mechanism is not None
+    passages = (1, 700)
+    for number in passages:
+        begin = partial(board.configure, settings_number(board), every, every, Source.SENSOR, number * 2**32 - 1250)
+        source = EmulatorSource(HOST_TARGET, lambda: open_target(HOST_TARGET, board))
+        Logger(source=source, out=log, rig=board.text(), append=True, samples=2500, begin=begin, restart=True).run()
+    verdict, reader = Verdict(), LogReader(log)
+    for stretch in Verifier(board).stretches(reader):
+        verdict.add(stretch)
+    assert not verdict.different and verdict.verified > 0.9 * 2500 * len(passages), verdict.text
+    assert (reader.account.missing_samples, reader.account.restarts) == (0, 0)
+    values, ticks = Values(mechanism), []
+    for record in LogReader(log):
+        assert getattr(record.item, "tick_high", record.tick // 2**32) == record.tick // 2**32
+        for rows in values.rows(record):
+            if rows.table == "samples":
+                ticks.append(rows.columns["tick"])
+                np.testing.assert_array_equal(rows.columns["t"], rows.columns["tick"] / 1000.0)
+    expected = np.concatenate(ticks)
+    assert {*passages} <= {*(expected // 2**32).tolist()} and (np.diff(expected) == 1).sum() == len(expected) - 2
+    (exported,) = export_log(log, "npz", tmp_path / "a", mechanism)
+    with np.load(exported) as arrays:
+        np.testing.assert_array_equal(arrays["tick"], expected)
+    state = LiveState(log, "a year")
+    state.take(log.read_bytes())
+    assert "cannot be shown" not in json.loads(state.as_json())["lost"]
+    write_log_figure(log, mechanism, tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
 def test_restart_beyond_2_to_the_31_is_found_by_the_session(tmp_path: Path) -> None:

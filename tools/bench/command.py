@@ -26,8 +26,6 @@ def _number(name: str, default: int, about: str = "Runs of each case.") -> tuple
 
 
 _SEEDS, _ONCE = _number("--seeds", 20), _number("--runs", 1, "Of each image.")
-_PROCESSES = option("--processes", 2, "At a time.")
-_TARGET = option("--on", "mps2-an386", "Emulator, or stream-host.")
 _FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
 _ACCURACY = ("mechanisms", "mechanisms-chosen", "mechanisms-summary", "mechanisms-two-windows", "imperfections")
 
@@ -100,13 +98,6 @@ CASES = (
         ),
     ),
     Case(
-        "cell",
-        "RC models on a cell that is no RC circuit; --write makes its records (needs PyBaMM).",
-        "cell",
-        ("cell",),
-        (click.Option(["--write"], type=_FOLDER),),
-    ),
-    Case(
         "build-choices",
         "What each choice of a build of the weak form takes and gives, on the pendulum's shipped rig.",
         "build_choices",
@@ -127,22 +118,6 @@ CASES = (
         ),
     ),
     Case(
-        "kept-recordings",
-        "The real rigs whose recordings are in tests/data/recordings, likewise; --cut writes the pieces anew from the "
-        "unpacked archives ARCHIVES/NAME-VERSION of the packages that hold them.",
-        "recorded_rigs:kept_report",
-        ("kept-recordings", "kept-predictions", "kept-verdicts"),
-        (click.Option(["--cut"], type=_FOLDER),),
-    ),
-    Case(
-        "recordings",
-        "Real rigs that others recorded: identified from one run, another one predicted, beside the published values. "
-        "FOLDER holds the pieces; --cut writes them there from checkouts of the repositories that hold the recordings.",
-        "recorded_rigs",
-        ("recordings", "predictions", "verdicts", "traps"),
-        (click.Argument(["folder"], type=_FOLDER), click.Option(["--cut"], type=_FOLDER)),
-    ),
-    Case(
         "fuzz-link",
         "The C side of the serial link under libFuzzer, with sanitizers (needs clang).",
         "fuzz:link_report",
@@ -157,77 +132,6 @@ CASES = (
         (option("--calls", 10_000_000), option("--seed", 1)),
     ),
     Case(
-        "codec",
-        "Corrupted frames of every length against both decoders of the serial link.",
-        "codec",
-        ("codec",),
-        (option("--frames", 1_000_000),),
-    ),
-    Case(
-        "log",
-        "Frames a minute of processor time through `pvid log`, losses, memory.",
-        "field:log_report",
-        ("log",),
-        (option("--frames", 200_000, least=1000),),
-    ),
-    Case(
-        "liar",
-        "A board that sends false data, against `pvid log` and all readers of its logs; then mutants of frames.",
-        "liar",
-        ("liar",),
-        (
-            option("--mutants", 100_000, "Frames changed at random."),
-            click.Option(["--only"], metavar="BEHAVIOUR", multiple=True, help="Of the table; may be given again."),
-        ),
-    ),
-    Case(
-        "attack",
-        "Mutated rig files, runs and command lines: how many defects they find.",
-        "attack",
-        ("attack",),
-        (
-            option("--mutants", 33_400, "Of each kind."),
-            option("--seed", 1, "Of the mutants."),
-            click.Option(
-                ["--only"], type=click.Choice(["rigs", "runs", "commands"]), multiple=True, help="May be given again."
-            ),
-            _PROCESSES,
-            click.Option(
-                ["--keep"],
-                type=click.Path(path_type=Path, file_okay=False),
-                help="Folder for files that caused a defect.",
-            ),
-            click.Option(
-                ["--done"],
-                type=click.Path(path_type=Path, dir_okay=False),
-                help="File of finished chunks: a run that was stopped continues behind them.",
-            ),
-        ),
-    ),
-    Case(
-        "field-log",
-        "An hour in the field, shortened in time: the board killed twice, its line closed once, all verified.",
-        "field",
-        ("field-log",),
-        (
-            _TARGET,
-            option("--samples", 3_600_000, "An hour at 1 kHz.", least=10_000),
-            option("--out", "field-log.pvlog", type=click.Path(path_type=Path)),
-        ),
-    ),
-    Case(
-        "year",
-        "A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page.",
-        "year",
-        ("year-f32", "year-q31"),
-        (
-            _TARGET,
-            option("--core", "f32", type=click.Choice(["f32", "q31"])),
-            option("--samples", 20_000, "At each passage."),
-            option("--out", "year.pvlog", type=click.Path(path_type=Path)),
-        ),
-    ),
-    Case(
         "long",
         "The long forms of the tests: 40 000 ticks, every build and board, mutants (an hour).",
         "long",
@@ -238,6 +142,24 @@ CASES = (
 
 # Measured once: the tables stay, the code is in the history, at the commit in their heads.
 FROZEN = (
+    Frozen(
+        "attack",
+        "Mutated rig files, runs and command lines: how many defects they find.",
+        ("attack",),
+        "tests/cli/test_mutants.py",
+    ),
+    Frozen(
+        "cell",
+        "RC models on a cell that is no RC circuit, simulated by PyBaMM.",
+        ("cell",),
+        "tests/identification/test_recorded_rigs.py",
+    ),
+    Frozen(
+        "codec",
+        "Corrupted frames of every length against both decoders of the serial link.",
+        ("codec",),
+        "tests/link/test_link.py",
+    ),
     Frozen(
         "compare-methods",
         "Weak form, strong form, output error and pysindy's weak form on the same runs.",
@@ -250,10 +172,40 @@ FROZEN = (
         "tests/board/test_targets.py",  # the instructions of a tick
     ),
     Frozen(
+        "recordings",
+        "Real rigs of other laboratories: identified from one run, another one predicted, beside the published values.",
+        ("recordings", "predictions", "verdicts", "traps"),
+        "tests/identification/test_recorded_rigs.py",
+    ),
+    Frozen(
         "strong-mechanisms",
         "The strong form on boards: its bits, the cost of a tick, recursive least squares beside it.",
         ("strong-mechanisms", "strong-fixed"),
         "tests/board/test_strong_image.py",
+    ),
+    Frozen(
+        "field-log",
+        "An hour in the field, shortened in time: the board killed twice, its line closed once, all verified.",
+        ("field-log",),
+        "tests/log/test_log.py",
+    ),
+    Frozen(
+        "kept-recordings",
+        "The real rigs whose recordings are in tests/data/recordings: one part identified, the other one predicted.",
+        ("kept-recordings", "kept-predictions", "kept-verdicts"),
+        "tests/identification/test_recorded_rigs.py",
+    ),
+    Frozen(
+        "liar",
+        "A board that sends false data, against `pvid log` and all readers of its logs; then mutants of frames.",
+        ("liar",),
+        "tests/log/test_liar.py tests/log/test_untrusted.py",
+    ),
+    Frozen(
+        "log",
+        "Frames a minute of processor time through `pvid log`, losses, memory.",
+        ("log",),
+        "tests/log/test_log.py",
     ),
     Frozen(
         "random-models",
@@ -267,6 +219,12 @@ FROZEN = (
         "What `pvid verify` takes for a long log, of each identifier that a board streams.",
         ("verify",),
         "tests/log/test_witness.py",
+    ),
+    Frozen(
+        "year",
+        "A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page.",
+        ("year-f32", "year-q31"),
+        "tests/log/test_verify.py",
     ),
 )
 

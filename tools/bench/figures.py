@@ -1,4 +1,4 @@
-"""The page host/docs/benchmarks.md: five figures, and sentences with figures, from the tables of results beside it."""
+"""The page host/docs/benchmarks.md: four figures, and sentences with figures, from the tables of results beside it."""
 
 from __future__ import annotations
 
@@ -240,54 +240,6 @@ def of_missing() -> list[str]:
     return lines
 
 
-# ---- recordings
-
-
-def draw_recordings(figure: Figure) -> None:
-    """What is not explained of a run that was not fitted: identified here, and published."""
-    axis = figure.subplots()
-    rows = [row for name in ("predictions", "kept-predictions") for row in results_of(name).where()]
-    labels = [f"{row['rig']} {row['sensor']}" for row in rows]
-    for key, marker, colour, label in (
-        ("of the second, published", "x", OTHER, "with the published parameters"),
-        ("R^2 of the second run from the first", "o", WEAK, "with those identified on the first run"),
-    ):
-        some = [(100 * (1 - float(row[key])), at) for at, row in enumerate(rows) if row[key] != "-"]
-        axis.plot(*zip(*some, strict=True), marker, color=colour, label=label)
-    axis.set_yticks(range(len(labels)), labels)
-    axis.invert_yaxis()
-    axis.set_xscale("log")
-    axis.set_xlabel("unexplained part of the second run, 1 - R², %")
-    axis.legend(fontsize="small")
-
-
-def of_recordings() -> list[str]:
-    """Sentences below the figure."""
-    rows = [row for name in ("predictions", "kept-predictions") for row in results_of(name).where()]
-    r2 = [float(row["R^2 of the second run from the first"]) for row in rows]
-    beside = [row for row in rows if row["of the second, published"] != "-"]
-    better = sum(
-        float(row["R^2 of the second run from the first"]) > float(row["of the second, published"]) for row in beside
-    )
-    back = {row["rig"] for row in rows if float(row["of the first from the second"]) < 0.9}
-    beyond = [row for name in ("verdicts", "kept-verdicts") for row in results_of(name).where()]
-    clash = [
-        f"{row['beyond 4 s.e. between the runs']} of `{row['rig']}`"
-        for row in beyond
-        if row["beyond 4 s.e. between the runs"] != "-"
-    ]
-    cell = [row for row in results_of("cell").rows if row[3].startswith("drive")]
-    return [
-        f"- {len({row['rig'] for row in rows})} rigs, {len(rows)} sensors: R² of the second run {min(r2):.2f} to "
-        f"{max(r2):.4f}; above that of the published parameters for {better} of {len(beside)}.",
-        f"- The other way round it is below 0.9 for {', '.join(f'`{one}`' for one in sorted(back))}.",
-        f"- Parameters of the two runs that differ by more than 4 standard errors: {', '.join(clash)}.",
-        "- A simulated cell (PyBaMM), which is no RC circuit: error of the predicted voltage "
-        + ", ".join(f"{row[4]} mV ({row[0]}, {'1' if 'mild' in row[3] else '2.5'} A)" for row in cell)
-        + ".",
-    ]
-
-
 # ---- robustness
 
 
@@ -311,43 +263,18 @@ def draw_robustness(figure: Figure) -> None:
 
 def of_robustness() -> list[str]:
     """Sentences below the figure."""
-    accidents, attack, longevity = (results_of(name) for name in ("accidents", "attack", "longevity"))
-    liar, codec, log, link = (sums_of(name) for name in ("liar", "codec", "log", "fuzz-link"))
-    api, field = sums_of("fuzz-api"), sums_of("field-log")
-    years = [sums_of(f"year-{core}") for core in ("f32", "q31")]
-    (rigs,), (senseless,) = results_of("random-models").where(kind="all"), results_of("senseless-models").where()
+    accidents, longevity = results_of("accidents"), results_of("longevity")
+    link, api = sums_of("fuzz-link"), sums_of("fuzz-api")
     long = results_of("long").column("result")
-    mutated = zip(attack.column("mutants"), attack.column("attacked with"), strict=True)
-    frames = log["frames in a minute of processor time"] / 1e6
-    early, late = (log[name] // 1000 for name in ("resident memory after a quarter, kB", "at the end, kB"))
     marked = sum("**" in cell or "NOT" in cell for row in longevity.rows for cell in row)
     return [
         f"- Accidents: {sum(map(int, accidents.column('wrong, no warning')))} wrong answers without a warning in "
         f"{len(accidents.rows)} rows of two runs.",
-        f"- `bench liar`, a board that sends false data: {liar['behaviours']} behaviours, {liar['runs of a command']} "
-        f"runs of a command, {liar['mutants of frames']} mutants of frames: {liar['defects']} defects; at most "
-        f"{liar['largest memory of the logger, kB'] // 1024} MB of memory, "
-        f"{liar['latest end of the logger, ms'] / 1000} s late.",
-        f"- `bench attack`, mutants: {', '.join(map(' '.join, mutated))}: "
-        f"{sum(map(int, attack.column('defects')))} defects.",
-        f"- `bench codec`, {codec['corrupted frames']} corrupted frames: {codec['accepted with wrong content']} "
-        f"accepted with wrong content; the second good frame behind is lost "
-        f"{codec['second good frame behind lost']} times.",
         f"- `bench fuzz-link`, {link['inputs']} inputs: {link['failures']} failures. `bench fuzz-api`, "
         f"{api['calls of step']} calls of `step`: no failure; {api['of these with an estimate published']} of "
         f"{api['runs of garbage with valid settings']} runs of garbage published an estimate.",
-        f"- `bench log`: {frames:.1f} million frames in a minute of one core, {log['lost']} lost; {early} MB of memory "
-        f"after a quarter, {late} MB at the end.",
-        f"- `bench field-log`, an hour at 1 kHz, the board killed twice, its line closed once: "
-        f"{field['missing between them']} of {field['samples recorded']} samples missing; the log "
-        f"names {field['taken while the line was closed']} that were taken while the line was closed.",
-        f"- `bench year`: {years[0]['passages of 2^32 ticks']} passages of 2^32 ticks, "
-        f"{sum(one['faults'] for one in years)} faults.",
         f"- `bench longevity`: {len(longevity.rows)} rows of a million ticks, {marked} cells silently wrong or not "
         "finite.",
-        f"- {rigs['rigs']} random rigs the whole road: {rigs['failures']} failures, {rigs['good']} with status "
-        f"`good`, off by at most {rigs['largest of good']} s.e.; {senseless['models']} descriptions without sense: "
-        f"{senseless['tracebacks']} tracebacks.",
         f"- `bench long`, the long tests: {long.count('passed')} of {len(long)} passed.",
     ]
 
@@ -388,7 +315,6 @@ PARTS = (
     Part("accuracy", ("refine-mechanisms", "mechanisms-chosen"), draw_accuracy, of_accuracy),
     Part("cost", ("model-boards", "sizes-models"), draw_cost, of_cost),
     Part("missing", (CAMPAIGNS[0],), draw_missing, of_missing, (9.0, 3.4)),
-    Part("recordings", ("predictions", "kept-predictions"), draw_recordings, of_recordings),
     Part("robustness", ("accidents",), draw_robustness, of_robustness, (9.0, 4.6)),
 )
 

@@ -15,8 +15,7 @@ from itertools import chain
 from typing import Any
 
 from cobs import cobs
-
-from bench.liar_board import (
+from lying_board import (
     CHECK_EVERY,
     PER_FRAME,
     RATE,
@@ -29,6 +28,7 @@ from bench.liar_board import (
     Step,
     message,
 )
+
 from pvid.link import frames as link
 from pvid.link.frames import (
     MAX_P,

@@ -1,40 +1,28 @@
-"""Mutated rig files, runs and command lines against the command line, in this process: what breaks it.
+"""Mutated rig files, runs and command lines, and the command line that they are given to, in this process.
 
-Each chunk has a shipped mechanism, its run and its rig file. Whatever a user gives, a command ends with one of its exit
-codes; a refusal is a sentence that begins with "pvid: "; no exception escapes, no library warns, no answer contains nan
-or inf, and nothing takes long or much memory. All is drawn from a seed.
+Whatever a user gives, a command ends with one of its exit codes; a refusal is a sentence that begins with "pvid: "; no
+exception escapes, no library warns, no answer contains nan or inf, and nothing takes long. All is drawn from a seed.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import itertools
-import json
 import math
-import multiprocessing
-import os
 import random
 import re
-import resource
 import signal
 import sys
-import tempfile
-import time
 import traceback
 import warnings
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
 import click
 import numpy as np
 
-from bench.case import Advance, Report, columns
-from bench.kinds import KINDS as KINDS_OF_MECHANISM
 from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.cli import main as cli
 from pvid.model.compiled import CompiledModel
@@ -43,16 +31,8 @@ from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Recording, write_recording
 from pvid.sim.simulated_run import simulation_of, write_simulated_run
 
-KINDS = ("rigs", "runs", "commands")
-MECHANISMS = KINDS_OF_MECHANISM
-HEADER = columns(
-    "attacked with | mutants | seed | answered | nothing identified | refused | defects | longest, s of processor"
-)
-
 LONGEST_S = 60  # of processor time, of one command: the run is a few seconds long
 _ASLEEP_S = 900  # of one command that does nothing
-_CHUNK = 1000  # mutants that are drawn one behind the other, by one process
-_MEMORY = 6 << 30  # of the process [bytes]
 _NO_NUMBER = re.compile(r"(?<!['\w])(nan|inf|NaN|Infinity)(?!['\w])")  # not where a note quotes a cell
 _ROWS = 3000  # of the run that is mutated
 
@@ -66,42 +46,6 @@ class Outcome:
     err: str
     warned: tuple[str, ...]
     trace: str
-    lasted_s: float
-
-
-@dataclass
-class Tally:
-    """Of the mutants of a kind; a defect is the command, what it did wrong, and the mutant's number."""
-
-    kind: str
-    seed: int
-    tried: int = 0
-    codes: Counter[int | None] = field(default_factory=Counter)
-    defects: list[tuple[list[str], str, int]] = field(default_factory=list)
-    longest_s: float = 0.0
-    slowest: tuple[int, list[str]] = (0, [])
-
-    def add(self, other: Tally) -> None:
-        """Takes the mutants of another tally in."""
-        self.tried += other.tried
-        self.codes += other.codes
-        self.defects += other.defects
-        if other.longest_s > self.longest_s:
-            self.longest_s, self.slowest = other.longest_s, other.slowest
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """In the order of HEADER."""
-        told = {"rigs": "rig files", "runs": "runs", "commands": "command lines"}[self.kind]
-        counts = (self.codes[DONE] + self.codes[DIFFERENT], self.codes[NOTHING_IDENTIFIED], self.codes[BAD_INPUT])
-        return (
-            told,
-            str(self.tried),
-            str(self.seed),
-            *map(str, counts),
-            str(len(self.defects)),
-            f"{self.longest_s:.1f}",
-        )
 
 
 class _Late(BaseException):
@@ -119,7 +63,6 @@ def call(arguments: Sequence[str | Path]) -> Outcome:
     trace = ""
     before = sys.argv
     handlers = {number: signal.signal(number, late) for number in (signal.SIGALRM, signal.SIGPROF)}
-    begun = time.process_time()
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         try:
@@ -140,8 +83,7 @@ def call(arguments: Sequence[str | Path]) -> Outcome:
             for number, handler in handlers.items():
                 signal.signal(number, handler)
             sys.argv = before
-    lasted = time.process_time() - begun
-    return Outcome(code, _text(out), _text(err), tuple(str(one.message) for one in warned), trace, lasted)
+    return Outcome(code, _text(out), _text(err), tuple(str(one.message) for one in warned), trace)
 
 
 def _text(stream: io.TextIOWrapper) -> str:
@@ -165,107 +107,6 @@ def complaint(outcome: Outcome) -> str | None:
     return None
 
 
-def campaign(
-    kinds: Sequence[str],
-    mutants: int,
-    seed: int,
-    processes: int,
-    progress: Callable[[int], None] | None = None,
-    keep: Path | None = None,
-    done: Path | None = None,
-) -> list[Tally]:
-    """Tries `mutants` of each kind, in chunks, in several processes; a tally of each kind.
-
-    Parameters
-    ----------
-    done
-        File of finished chunks, a line each: those in it are counted and left out, the others are added.
-    """
-    tallies = {kind: Tally(kind, seed) for kind in kinds}
-    chunks: list[Chunk] = [
-        (kind, min(_CHUNK, mutants - first), seed, first) for first in range(0, mutants, _CHUNK) for kind in kinds
-    ]
-    known = {} if done is None else _finished(done)
-    for chunk in chunks:
-        if chunk in known:
-            tallies[chunk[0]].add(known[chunk])
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-        os.environ.setdefault(name, "1")  # matrices of a few rows: more threads only wait for one another
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context, max_tasks_per_child=1) as pool:
-        running = {pool.submit(_chunk, *chunk, keep): chunk for chunk in chunks if chunk not in known}
-        for one in as_completed(running):
-            tally = one.result()
-            tallies[tally.kind].add(tally)
-            if done is not None:
-                _append_finished(done, running[one], tally)
-            if progress is not None:
-                progress(sum(each.tried for each in tallies.values()))
-    return list(tallies.values())
-
-
-Chunk = tuple[str, int, int, int]  # kind, mutants, seed, number of the first
-
-
-def _finished(path: Path) -> dict[Chunk, Tally]:
-    """Tallies of the chunks in a file; none without it."""
-    found = {}
-    for line in path.read_text().splitlines() if path.exists() else ():
-        kind, mutants, seed, first, codes, defects, longest_s, slowest = json.loads(line)
-        found[kind, mutants, seed, first] = Tally(
-            kind, seed, mutants, Counter(dict(codes)), [tuple(one) for one in defects], longest_s, tuple(slowest)
-        )
-    return found
-
-
-def _append_finished(path: Path, chunk: Chunk, tally: Tally) -> None:
-    with path.open("a") as file:
-        line = [*chunk, list(tally.codes.items()), tally.defects, tally.longest_s, tally.slowest]
-        file.write(json.dumps(line) + "\n")
-
-
-def _chunk(kind: str, mutants: int, seed: int, first: int, keep: Path | None) -> Tally:
-    with tempfile.TemporaryDirectory(prefix="pvid-attack-") as folder:
-        return attack(kind, mutants, seed, Path(folder), first, keep)
-
-
-def attack(kind: str, mutants: int, seed: int, folder: Path, first: int = 0, keep: Path | None = None) -> Tally:
-    """Tries mutants of a kind in a folder, in this process.
-
-    Parameters
-    ----------
-    kind
-        One of KINDS.
-    folder
-        Empty, and written to at will.
-    first
-        Number of the first mutant: others are drawn with another one.
-    keep
-        Where files that broke something go; they are dropped otherwise.
-    """
-    draw = random.Random(f"{kind} {seed} {first}")
-    tally = Tally(kind, seed)
-    with _at_most(_MEMORY), contextlib.chdir(folder):
-        subject = written_subject(draw.choice(MECHANISMS), seed)
-        next_one = {"rigs": _rigs, "runs": _runs, "commands": _commands}[kind]
-        for number, (arguments, mutant) in enumerate(itertools.islice(next_one(draw, subject), mutants), first):
-            outcome = call(arguments)
-            tally.tried += 1
-            tally.codes[outcome.code] += 1
-            if outcome.lasted_s > tally.longest_s:
-                tally.longest_s, tally.slowest = outcome.lasted_s, (number, arguments)
-            wrong = complaint(outcome)
-            if wrong is not None:
-                tally.defects.append((arguments, wrong, number))
-                if mutant is not None and keep is not None:
-                    keep.mkdir(parents=True, exist_ok=True)
-                    (keep / f"{kind}-{seed}-{number}{mutant.suffix}").write_bytes(mutant.read_bytes())
-    return tally
-
-
-_Mutants = Iterator[tuple[list[str], Path | None]]
-
-
 @dataclass(frozen=True)
 class Subject:
     """A mechanism whose run is in run.csv, and its rig file beside it in run.toml."""
@@ -283,56 +124,36 @@ def written_subject(name: str, seed: int) -> Subject:
     return Subject(compiled_of(name), Recording(t, run, simulation.rig.sample_rate))
 
 
-def _rigs(draw: random.Random, subject: Subject) -> _Mutants:
-    """Command and rig file."""
-    rig = Path("rig.toml")
+def of_rigs(draw: random.Random, subject: Subject) -> Iterator[list[str]]:
+    """Commands, each behind another rig file."""
     commands = (
         ["design", "--rig", "rig.toml", "--duration", "4"],
         *(["identify", "run.csv", "--rig", "rig.toml", *more] for more in ([], ["--json"], ["--core", "q31"])),
     )
     while True:
-        rig.write_bytes(rig_text(draw, subject.model))
-        yield list(draw.choice(commands)), rig
+        Path("rig.toml").write_bytes(rig_text(draw, subject.model))
+        yield list(draw.choice(commands))
 
 
-def _runs(draw: random.Random, subject: Subject) -> _Mutants:
-    """Command and run."""
+def of_runs(draw: random.Random, subject: Subject) -> Iterator[list[str]]:
+    """Commands, each behind another run."""
     originals = written_runs(subject, Path())
     while True:
-        if draw.random() < 0.5:
-            mutant = Path("mutant.csv")
-            mutant.write_bytes(distorted_run(subject.recording, draw))
-        else:
-            suffix = draw.choice(list(originals))
-            mutant = Path(f"mutant{suffix}")
-            mutant.write_bytes(mutated_run(originals[suffix], draw))
-        look = draw.random() < _LOOKED_AT
-        yield ["look", str(mutant)] if look else ["identify", str(mutant), "--rig", "run.toml", "--json"], mutant
+        suffix = ".csv" if draw.random() < 0.5 else draw.choice(list(originals))
+        distorted = suffix == ".csv" and draw.random() < 0.8
+        mutant = distorted_run(subject.recording, draw) if distorted else mutated_run(originals[suffix], draw)
+        Path(f"mutant{suffix}").write_bytes(mutant)
+        looked = ["look", f"mutant{suffix}"]
+        yield looked if draw.random() < _LOOKED_AT else ["identify", f"mutant{suffix}", "--rig", "run.toml", "--json"]
 
 
-def _commands(draw: random.Random, _: Subject) -> _Mutants:
-    """Command lines, none twice; what they wrote is removed."""
-    keep, drawn = {"run.csv", "run.toml"}, set()
+def of_command_lines(draw: random.Random, _: Subject) -> Iterator[list[str]]:
+    """What they wrote is removed."""
     while True:
-        line = command_line(draw)
-        if tuple(line) in drawn:
-            continue
-        drawn.add(tuple(line))
-        yield line, None
+        yield command_line(draw)
         for path in Path().iterdir():
-            if path.name not in keep and path.is_file():
+            if path.name not in ("run.csv", "run.toml") and path.is_file():
                 path.unlink()
-
-
-@contextlib.contextmanager
-def _at_most(memory: int) -> Iterator[None]:
-    """Bounds the memory of this process [bytes] for the context."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 # ---- rig files and runs
@@ -534,22 +355,3 @@ def command_line(draw: random.Random) -> list[str]:
     if draw.random() < 0.03:
         line.append(draw.choice((*_NUMBERS, *_NAMES, "--nope", "-h", "--version")))
     return line
-
-
-def report(
-    mutants: int,
-    seed: int,
-    only: Sequence[str],
-    processes: int,
-    keep: Path | None,
-    done: Path | None,
-    advance: Advance,
-) -> Report:
-    """See bench.case."""
-    tallies = campaign(only or KINDS, mutants, seed, processes, lambda _: advance(), keep and keep.resolve(), done)
-    faults = [
-        f"{one.kind}, mutant {number}: {' '.join(arguments)}: {wrong}"
-        for one in tallies
-        for arguments, wrong, number in one.defects
-    ]
-    return Report([("attack", HEADER, [one.cells for one in tallies])], faults)

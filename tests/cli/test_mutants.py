@@ -1,32 +1,28 @@
-"""Mutated rig files, runs and command lines, in short form: nothing but answers and sentences comes back.
-
-The long form is `pvid bench attack`; its figures are in attack.csv.
-"""
+"""Mutated rig files, runs and command lines: nothing but answers and sentences comes back."""
 
 from __future__ import annotations
 
 import os
+from itertools import islice
 from pathlib import Path
 from random import Random
 
 import pytest
-
-from bench.attack import (
-    HEADER,
-    KINDS,
-    LONGEST_S,
+from mutants import (
     Outcome,
-    attack,
     call,
-    campaign,
     command_line,
     complaint,
     distorted_run,
     mutated_run,
+    of_command_lines,
+    of_rigs,
+    of_runs,
     rig_text,
     written_subject,
 )
-from bench.figures import results_of
+
+from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import MOST_BYTES, toml_document
 from pvid.cli.identify_run import recording_of
@@ -34,24 +30,21 @@ from pvid.rig import size as run_size
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import write_recording
 
-SHORT = {"rigs": 20, "runs": 8, "commands": 20}
+MUTANTS = {"rigs": (of_rigs, 20), "runs": (of_runs, 8), "commands": (of_command_lines, 20)}
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_mutants_get_answers_and_sentences_alone(kind: str, tmp_path: Path) -> None:
-    tally = attack(kind, SHORT[kind], 7, tmp_path)
-    assert tally.defects == []
-    assert tally.tried == SHORT[kind] == sum(tally.codes.values())
-    assert tally.codes[2] > 0  # some are refused, and
-    assert tally.codes[0] > 0  # some are answered
-
-
-def test_the_table_of_results_counts_every_mutant() -> None:
-    kept = results_of("attack")
-    assert kept.header == HEADER and len(kept.rows) == len(KINDS)
-    for _, mutants, _, answered, nothing, refused, defects, longest_s in kept.rows:
-        assert int(answered) + int(nothing) + int(refused) == int(mutants) >= 500
-        assert int(defects) == 0 and float(longest_s) < LONGEST_S
+@pytest.mark.parametrize("kind", MUTANTS)
+def test_mutants_get_answers_and_sentences_alone(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    mutants, number = MUTANTS[kind]
+    draw = Random(f"{kind} 7 0")
+    subject = written_subject(draw.choice(KINDS), 7)
+    codes = set()
+    for arguments in islice(mutants(draw, subject), number):
+        outcome = call(arguments)
+        assert complaint(outcome) is None, arguments
+        codes.add(outcome.code)
+    assert codes >= {0, 2}  # some are answered, some are refused
 
 
 def test_mutants_are_drawn_from_their_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,26 +60,16 @@ def test_mutants_are_drawn_from_their_seed(tmp_path: Path, monkeypatch: pytest.M
         assert first == again != other
 
 
-def test_a_campaign_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
-    done = tmp_path / "done"
-    first = campaign(["commands"], 3, 5, 1, done=done)
-    assert [one.tried for one in first] == [3] and len(done.read_text().splitlines()) == 1
-    done.write_text(done.read_text().replace('"commands", 3, 5, 0', '"commands", 1000, 5, 0'))
-    rest = campaign(["commands"], 1002, 5, 1, done=done)[0]
-    assert rest.tried == 1002 and sum(rest.codes.values()) == 3 + 2  # the second chunk alone was run
-    assert len(done.read_text().splitlines()) == 2
-
-
 @pytest.mark.parametrize(
     ("outcome", "told"),
     [
-        (Outcome(None, "", "", (), "Traceback\nValueError: x", 0.1), "ValueError: x"),
-        (Outcome(0, "", "", ("overflow",), "", 0.1), "warning: overflow"),
-        (Outcome(7, "", "", (), "", 0.1), "exit code 7"),
-        (Outcome(2, "", "Usage: ...", (), "", 0.1), "a refusal without its sentence"),
-        (Outcome(0, "g  nan", "", (), "", 0.1), "no number"),
-        (Outcome(2, "", "pvid: no", (), "", 0.1), None),
-        (Outcome(0, "g  9.8", "", (), "", 0.1), None),
+        (Outcome(None, "", "", (), "Traceback\nValueError: x"), "ValueError: x"),
+        (Outcome(0, "", "", ("overflow",), ""), "warning: overflow"),
+        (Outcome(7, "", "", (), ""), "exit code 7"),
+        (Outcome(2, "", "Usage: ...", (), ""), "a refusal without its sentence"),
+        (Outcome(0, "g  nan", "", (), ""), "no number"),
+        (Outcome(2, "", "pvid: no", (), ""), None),
+        (Outcome(0, "g  9.8", "", (), ""), None),
     ],
 )
 def test_defects_are_classified(outcome: Outcome, told: str | None) -> None:
@@ -105,7 +88,7 @@ def test_defects_are_classified(outcome: Outcome, told: str | None) -> None:
         (["tune", ""], "is a directory"),
         (["plot", "/dev/full", "--set", "known.l1=0.3"], "is not a regular file"),
         (["tables", "--form", "fir", "--points", "1000000000000001"], "no core takes more than 8191"),
-        (["bench", "log", "--frames", "0"], "--frames"),
+        (["bench", "longevity", "--ticks", "0"], "--ticks"),
         (["identify", "run.csv", "--rig", "run.toml", "--figure", "x.pgf"], "must end in .png, .svg, .pdf"),
         (["identify", "run\x1b[31m\n.csv"], "run\\x1b[31m\\n.csv"),
     ],

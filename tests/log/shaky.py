@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import serial
 
-from bench.case import Advance, Report, counts
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import Streamed, settings_number
@@ -26,7 +25,7 @@ from pvid.link.port import Port, open_port
 from pvid.log.file import Segment
 from pvid.log.reader import Account, LogReader, Record
 from pvid.log.recorder import Logger
-from pvid.log.verify import Stretch, Verdict, Verifier
+from pvid.log.verify import Stretch, Verifier
 from pvid.rig.mechanism_file import MechanismRig
 
 _SAMPLES_A_FRAME = 16
@@ -68,11 +67,11 @@ def throughput(count: int) -> Throughput:
     """
     ours, theirs = os.openpty()
     tty.setraw(theirs)
-    code = f"from bench.field import send_frames; send_frames({ours}, {count})"
+    code = f"from shaky import send_frames; send_frames({ours}, {count})"
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "a.pvlog"
         arguments = ["log", os.ttyname(theirs), str(log), "--samples", str(_SAMPLES_A_FRAME * count)]
-        sender = subprocess.Popen([sys.executable, "-c", code], pass_fds=[ours])
+        sender = subprocess.Popen([sys.executable, "-c", code], pass_fds=[ours], cwd=Path(__file__).parent)
         logger = subprocess.Popen(
             [sys.executable, "-m", "pvid", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         )
@@ -237,9 +236,7 @@ class _Accidents:
         """See logreader.Observer."""
 
 
-def field_log(
-    name: str, samples: int, log: Path, progress: Callable[[int], None] | None = None
-) -> tuple[Account, list[Stretch]]:
+def field_log(name: str, samples: int, log: Path) -> tuple[Account, list[Stretch]]:
     """Records a board that samples as fast as the line goes, with three accidents, and verifies the log.
 
     The board starts over whenever the link comes up, so that every segment can be verified; a quarter of `samples`, at
@@ -262,36 +259,5 @@ def field_log(
     finally:
         source.end()
     reader = LogReader(log)
-    stretches = list(Verifier(board, progress).stretches(reader))
+    stretches = list(Verifier(board).stretches(reader))
     return reader.account, stretches
-
-
-def report(on: str, samples: int, out: Path, advance: Advance) -> Report:
-    """See bench.case."""
-    account, stretches = field_log(on, samples, out, lambda _: advance())
-    verdict = Verdict()
-    for stretch in stretches:
-        verdict.add(stretch)
-    numbers = (
-        ("samples recorded", account.samples),
-        ("missing between them", account.missing_samples),
-        ("taken while the line was closed", account.unheard),
-        ("estimates and hashes compared", verdict.checked),
-        ("different", verdict.different),
-    )
-    whole = len(verdict.good) == len(account.segments) and not verdict.different and not account.missing_samples
-    said = [*(one.text for one in stretches), verdict.text, account.text]
-    return Report([counts("field-log", numbers)], [] if whole else ["not every segment is whole"], said)
-
-
-def log_report(frames: int, advance: Advance) -> Report:
-    """See bench.case."""
-    seen = throughput(frames)
-    numbers = (
-        ("frames of 16 samples", seen.frames),
-        ("lost", seen.lost),
-        ("frames in a minute of processor time", round(60 * seen.frames / seen.cpu_s)),
-        ("resident memory after a quarter, kB", seen.early_kb),
-        ("at the end, kB", seen.late_kb),
-    )
-    return Report([counts("log", numbers)], [] if seen.frames == frames and not seen.lost else ["frames are lost"])
