@@ -35,6 +35,7 @@ ENUMS = {
     "Standing": ("pvid_standing_state", "Whether a published estimate still holds"),
     "Doubt": ("pvid_doubt", "Why it is doubted or withdrawn, one bit each"),
     "Law": ("pvid_law", "How the estimate follows the data"),
+    "RecordStatus": ("pvid_record_status", "Analysis of a record's save or load"),
     "SnapshotStatus": ("pvid_snapshot_status", "Analysis of a snapshot's restore"),
 }
 # Settings: class, its struct without the core, its header, and the fields that every user gives.

@@ -251,6 +251,25 @@ PROOFS = (
         ("-eva-min-loop-unroll", "100"),
     ),
     Proof(
+        "record",
+        "any bytes of any length read as a record of any number of parameters; any parameter written into any room",
+        ("src/persist/record.c", "src/persist/crc32.c"),
+        ("-eva-min-loop-unroll", "8", "-eva-auto-loop-unroll", "10"),
+    ),
+    Proof(
+        "record_q31",
+        "any estimate in any format saved, any record loaded",
+        ("src/persist/record_weak_q31.c", "src/persist/record.c", "src/number/integer_q31.c"),
+        (
+            *("-eva-min-loop-unroll", "8", "-eva-split-return", "full"),
+            *("-eva-slevel-function", "pvid_clamp_q31:10,fixed_of:20,take_start:100,take_errors:100"),
+        ),
+        taken=(
+            *("pvid_record_get", "pvid_record_inspect", "pvid_record_put", "pvid_weak_read_q31"),
+            *("pvid_weak_init_layout_q31", "pvid_scale_q31", "pvid_bit_length_q31"),
+        ),
+    ),
+    Proof(
         "snapshot",
         "two slots with any bytes in them, any lengths and identities; sealing one",
         ("src/persist/snapshot.c", "src/persist/crc32.c", "src/number/fnv.c"),

@@ -21,7 +21,7 @@ static void flash_write(uint8_t slot, size_t length, size_t power)
 static void save(size_t power)
 {
     const pvid_snapshot_choice choice = pvid_snapshot_choose(flash[0], flash[1], SLOT);
-    const size_t length = dc_motor_save(choice.generation, image, SLOT);
+    const size_t length = dc_motor_snapshot_save(choice.generation, image, SLOT);
     if (length > 0u) {
         flash_write(choice.next, length, power);
     }
@@ -34,7 +34,7 @@ static bool restored(void)
         return false;
     }
     const pvid_snapshot_choice choice = pvid_snapshot_choose(flash[0], flash[1], SLOT);
-    return (choice.newest >= 0) && dc_motor_restore(flash[choice.newest], SLOT);
+    return (choice.newest >= 0) && dc_motor_snapshot_restore(flash[choice.newest], SLOT);
 }
 
 int main(void)

@@ -150,7 +150,7 @@ def enumerators(header: str, enumeration: str) -> list[str]:
 
 @pytest.mark.parametrize(
     ("header", "enumeration"),
-    [("status.h", "pvid_reason"), ("snapshot_slots.h", "pvid_snapshot_status")],
+    [("status.h", "pvid_reason"), ("snapshot_slots.h", "pvid_snapshot_status"), ("record.h", "pvid_record_status")],
 )
 def test_every_enumerator_has_its_remedy(header: str, enumeration: str) -> None:
     text = text_of(DOCS / "reasons.md")

@@ -245,6 +245,35 @@ static void freeze_weak(bool frozen)
     pvid_weak_freeze_f32(&weak.self, frozen);
 }
 
+static uint8_t record[PVID_RECORD_BYTES(PVID_MAX_P)];
+
+/* What is published and valid is the start of another life, with the errors that it has; nothing else is. */
+static void check_record_f32(const pvid_estimate_f32 *estimate, uint32_t number)
+{
+    static pvid_weak_f32 next;
+    pvid_record_writer writer = {0, 0, 0};
+    const uint32_t n_p = weak.self.estimator.model->n_p;
+    pvid_record_status status = PVID_RECORD_MORE;
+    for (uint32_t left = n_p; (left > 0u) && (status == PVID_RECORD_MORE); left--) {
+        status = pvid_record_save_weak_f32(&weak.self, &writer, 1u, record, sizeof record);
+    }
+    const bool valid = (number > 0u) && (estimate->standing.state == (uint8_t)PVID_STANDING_VALID);
+    require(status == (valid ? PVID_RECORD_DONE : PVID_RECORD_NOT_VALID), "a record is of a valid estimate");
+    bool sound = valid;
+    for (uint32_t a = 0; a < n_p; a++) {
+        sound = sound && (estimate->se[a] > 1.0e-17f) && (estimate->se[a] < 1.0e17f);
+    }
+    pvid_weak_config_f32 alone = weak.config;
+    alone.refine = NULL;
+    if (sound && (pvid_weak_init_f32(&next, &alone) == PVID_OK)) {
+        require(pvid_record_load_weak_f32(&next, &alone, 1u, record, sizeof record) == PVID_RECORD_DONE,
+                "a record is taken");
+        const pvid_estimate_f32 *start = pvid_weak_estimate_f32(&next);
+        check_estimate_f32(start, n_p);
+        require(memcmp(start->se, estimate->se, n_p * sizeof start->se[0]) == 0, "a record has its errors");
+    }
+}
+
 static void check_weak(bool published)
 {
     check_p_f32(&weak.self.estimator);
@@ -258,6 +287,7 @@ static void check_weak(bool published)
     require(pvid_weak_read_f32(&weak.self, &copy, &number) && ((number > 0u) == weak.self.trust.published) &&
                 (memcmp(&copy, estimate, sizeof copy) == 0),
             "a read estimate is the published one");
+    check_record_f32(&copy, number);
     pvid_estimator_assess_f32(&weak.self.estimator, &copy);
     check_estimate_f32(&copy, weak.self.estimator.model->n_p);
 }
@@ -514,6 +544,24 @@ static void freeze_weak_q31(bool frozen)
     pvid_weak_freeze_q31(&weak_q31.self, frozen);
 }
 
+static void check_record_q31(const pvid_estimate_q31 *estimate, uint32_t number)
+{
+    static pvid_weak_q31 next;
+    pvid_record_writer writer = {0, 0, 0};
+    const uint32_t n_p = weak_q31.self.estimator.model->n_p;
+    pvid_record_status status = PVID_RECORD_MORE;
+    for (uint32_t left = n_p; (left > 0u) && (status == PVID_RECORD_MORE); left--) {
+        status = pvid_record_save_weak_q31(&weak_q31.self, &writer, 1u, record, sizeof record);
+    }
+    const bool valid = (number > 0u) && (estimate->standing.state == (uint8_t)PVID_STANDING_VALID);
+    require(status == (valid ? PVID_RECORD_DONE : PVID_RECORD_NOT_VALID), "a q31 record is of a valid estimate");
+    if (valid && (pvid_weak_init_q31(&next, &weak_q31.config) == PVID_OK)) {
+        status = pvid_record_load_weak_q31(&next, &weak_q31.config, 1u, record, sizeof record);
+        require((status == PVID_RECORD_DONE) || (status == PVID_RECORD_IMPLAUSIBLE), "a q31 record is read");
+        check_p_q31(&next.estimator);
+    }
+}
+
 static void check_weak_q31(bool published)
 {
     check_p_q31(&weak_q31.self.estimator);
@@ -524,6 +572,7 @@ static void check_weak_q31(bool published)
                     ((number > 0u) == weak_q31.self.trust.published) &&
                     (memcmp(&copy, pvid_weak_estimate_q31(&weak_q31.self), sizeof copy) == 0),
                 "a read q31 estimate is the published one");
+        check_record_q31(&copy, number);
         pvid_estimator_assess_q31(&weak_q31.self.estimator, &copy);
     }
 }

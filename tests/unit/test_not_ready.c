@@ -48,6 +48,12 @@ static void call_all(pvid_weak_f32 *one, pvid_weak_q31 *other)
     assert_int_equal(pvid_snapshot_restore_weak_f32(one, &config, image, sizeof image), PVID_SNAPSHOT_NOT_READY);
     assert_int_equal(pvid_snapshot_restore_weak_q31(other, &kapitza_config_q31, image, sizeof image),
                      PVID_SNAPSHOT_NOT_READY);
+    pvid_record_writer writer = {0, 0, 0};
+    assert_int_equal(pvid_record_save_weak_f32(one, &writer, 1, image, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_save_weak_q31(other, &writer, 1, image, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_load_weak_f32(one, &config, 1, image, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_load_weak_q31(other, &kapitza_config_q31, 1, image, sizeof image),
+                     PVID_RECORD_NOT_READY);
 }
 
 static void static_objects_before_init_do_nothing(void **state)
@@ -144,6 +150,16 @@ static void estimate_is_read_from_a_ready_object_only(void **state)
     assert_false(pvid_weak_read_q31(&weak_q31, NULL, NULL));
     assert_true(pvid_weak_read_f32(&weak, &estimate, NULL));
     assert_true(pvid_weak_read_q31(&weak_q31, &estimate_q31, NULL));
+    pvid_record_writer writer = {0, 0, 0};
+    assert_int_equal(pvid_record_save_weak_f32(&weak, NULL, 1, image, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_save_weak_f32(&weak, &writer, 1, NULL, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_load_weak_f32(&weak, NULL, 1, image, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_load_weak_f32(&weak, &config, 1, NULL, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_save_weak_q31(&weak_q31, NULL, 1, image, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_save_weak_q31(&weak_q31, &writer, 1, NULL, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_load_weak_q31(&weak_q31, NULL, 1, image, sizeof image), PVID_RECORD_NOT_READY);
+    assert_int_equal(pvid_record_load_weak_q31(&weak_q31, &kapitza_config_q31, 1, NULL, sizeof image),
+                     PVID_RECORD_NOT_READY);
     assert_int_equal(pvid_snapshot_save_weak_f32(&weak, NULL, 1, image, sizeof image), 0);
     assert_int_equal(pvid_snapshot_save_weak_f32(&weak, &config, 1, NULL, sizeof image), 0);
     assert_int_equal(pvid_snapshot_save_weak_q31(&weak_q31, NULL, 1, image, sizeof image), 0);

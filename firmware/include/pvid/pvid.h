@@ -21,6 +21,7 @@
 #include "pvid/model.h"
 #include "pvid/publication.h"
 #include "pvid/refine.h"
+#include "pvid/record_weak.h"
 #include "pvid/snapshot_refine.h"
 #include "pvid/snapshot_weak.h"
 #include "pvid/status.h"

@@ -15,6 +15,7 @@
 #include "pvid/misfit_q31.h"
 #include "pvid/model_q31.h"
 #include "pvid/publication_q31.h"
+#include "pvid/record_weak_q31.h"
 #include "pvid/snapshot_weak_q31.h"
 #include "pvid/status.h"
 #include "pvid/text.h"

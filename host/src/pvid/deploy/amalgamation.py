@@ -26,7 +26,7 @@ _PUBLIC = re.compile(
 )
 _MACRO = re.compile(r"^[ \t]*#[ \t]*define (\w+)", re.MULTILINE)
 _TEXTS = "pvid/text.h"
-_IN_HEADER = ("pvid/standing.h", "pvid/status.h", _TEXTS)
+_IN_HEADER = ("pvid/record.h", "pvid/standing.h", "pvid/status.h", _TEXTS)
 _FIRST = "number/uncontracted.h"
 _PART = re.compile(r"A part of \w+\.c\.")
 

@@ -17,7 +17,7 @@ class Arithmetic:
     ----------
     build : of the core, its name and words
     without : end of the names of sources that it does without
-    header, snapshot_header : of the identifier
+    header : of the identifier; those of its record and its snapshot are named after it
     sample_type : in C
     samples : what a sample is, for a README
     is_integer : samples are counts, and parameters are integers with a scale
@@ -27,7 +27,6 @@ class Arithmetic:
     build: CoreBuild
     without: str
     header: str
-    snapshot_header: str
     sample_type: str
     samples: str
     is_integer: bool
@@ -43,7 +42,6 @@ FLOAT = Arithmetic(
     build=FLOAT_CORE,
     without="_q31",
     header="pvid/weak.h",
-    snapshot_header="pvid/snapshot_weak.h",
     sample_type="float",
     samples="float32",
     is_integer=False,
@@ -53,7 +51,6 @@ FIXED = Arithmetic(
     build=FIXED_CORE,
     without="_f32",
     header="pvid/weak_q31.h",
-    snapshot_header="pvid/snapshot_weak_q31.h",
     sample_type="int32_t",
     samples="integers only, samples in counts of the sensors",
     is_integer=True,

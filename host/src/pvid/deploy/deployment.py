@@ -11,6 +11,7 @@ import numpy.typing as npt
 from pvid.configuration.excitation import Excitation
 from pvid.deploy.arithmetic import Arithmetic
 from pvid.settings.enums import Reason
+from pvid.twin.fnv import START, fold_bytes
 
 Files = dict[str, str]
 
@@ -121,6 +122,16 @@ class Deployment:
     def library(self) -> str:
         """Name of the package."""
         return f"pvid_{self.name}"
+
+    @property
+    def mechanism(self) -> int:
+        """Hash of the names and units of the parameters: a record of others is refused."""
+        return fold_bytes(START, "".join(f"{one.name}\0{one.unit}\0" for one in self.parameters).encode())
+
+    @property
+    def record_bytes(self) -> int:
+        """PVID_RECORD_BYTES of pvid/record.h."""
+        return 16 + 7 * len(self.parameters) + len(self.parameters) ** 2
 
     @property
     def sample_type(self) -> str:

@@ -53,6 +53,8 @@ def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequ
                 f"Delete `{d.name}_example.c` and `.h` then.",
                 *_refined(d),
                 "",
+                *_kept(d),
+                "",
                 *(f"- {one}" for one in (memory.note(d), *notes) if one),
                 "",
             ]
@@ -70,6 +72,16 @@ def _refined(d: Deployment) -> list[str]:
         f"`{d.name}_begin_refined()` in place of `{d.name}_begin()` switches the second stage on, as the example does:",
         "it fits the full equations, from the first stage's estimate on, to the statistical limit, and",
         f"`{d.name}_read_refined(value, error)` reads its estimate. Without it neither flash nor RAM is taken.",
+    ]
+
+
+def _kept(d: Deployment) -> list[str]:
+    """How the values survive the life of a program."""
+    return [
+        f"The values survive an update: `while ((status = {d.name}_save(record)) == PVID_RECORD_MORE) {{}}` fills",
+        f"{d.record_bytes} bytes, a piece a call; write them to your flash if it ends with `PVID_RECORD_DONE`. In",
+        f"the next life `{d.name}_load(record)` behind `{d.name}_begin()` makes them the start, whatever its release",
+        "and settings; a record that is damaged or of other parameters is refused with a reason.",
     ]
 
 

@@ -129,6 +129,22 @@ class Law(_Named):
     PSEUDOVELOCITY = 1
 
 
+class RecordStatus(_Named):
+    """Analysis of a record's save or load (pvid_record_status)."""
+
+    DONE = 0
+    MORE = 1
+    NOT_VALID = 2
+    NO_ROOM = 3
+    NONE = 4
+    CUT_SHORT = 5
+    DAMAGED = 6
+    OTHER_FORMAT = 7
+    OTHER_MECHANISM = 8
+    IMPLAUSIBLE = 9
+    NOT_READY = 10
+
+
 class SnapshotStatus(_Named):
     """Analysis of a snapshot's restore (pvid_snapshot_status)."""
 
