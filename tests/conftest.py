@@ -1,4 +1,4 @@
-"""What several tests share: the builds of the core and the standard rig, made once a session."""
+"""What several tests share: the builds of the core, made once a session."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
-from pendulum_plant import Simulation, simulate, standard_sensors
 from processes import children_of
 
 from bench.kinds import KINDS
@@ -46,7 +45,7 @@ SLOW = """
     codegen/weak_c core/recorded_hashes oracle/feedback codegen/generated_f32 oracle/weak_identify
     bench/accidents core/sizes_agree twin/state tools/notebooks oracle/corners model/elimination
     twin/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
-    twin/runs_begin oracle/scale identification/refined_length board/generated twin/refinement codegen/refine
+    twin/runs_begin oracle/scale identification/refined_length twin/refinement codegen/refine
     core/dropped_calls sim/rigs core/bad_config bench/longevity core/model_library core/equation_error tools/docs
     identification/wild_samples board/port cli/output tools/proofs log/untrusted
     show/pictures tools/loops oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random
@@ -65,14 +64,14 @@ QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--long", action="store_true", help="The long forms of the tests that have one (pvid bench long).")
+    parser.addoption("--long", action="store_true", help="The long forms of the tests that have one.")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     keep_freed()
     gc.set_threshold(50_000, 20, 100)  # modules and SymPy's expressions live to the end: 5 % of the time found nothing
-    config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and in `pvid bench long`")
-    config.addinivalue_line("markers", "long: in `pvid bench long` alone")
+    config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and with --long")
+    config.addinivalue_line("markers", "long: with --long alone, in `./tools/test night`")
     config.addinivalue_line("markers", "by_day(number): its first cases; the others in `./tools/test night`")
     config.addinivalue_line("markers", "slow: left out of `./tools/test quick`")
     config.addinivalue_line(
@@ -84,9 +83,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def ticks(request: pytest.FixtureRequest) -> int:
     """The length of a run [ticks], of the test's mark of that name."""
     mark = request.node.get_closest_marker("ticks")
-    length = int(mark.kwargs["long" if request.config.getoption("--long") else "short"])
-    request.node.user_properties.append(("ticks", length))
-    return length
+    return int(mark.kwargs["long" if request.config.getoption("--long") else "short"])
 
 
 def of_night(items: list[pytest.Item]) -> Iterator[pytest.Item]:
@@ -162,9 +159,3 @@ def matrix(request: pytest.FixtureRequest, native: Native) -> dict[str, Native]:
     built = {Path(line).parent.name: Native(Path(line)) for line in done.stdout.splitlines()}
     assert list(built) == names
     return {"gcc-O2": native, **built}
-
-
-@pytest.fixture(scope="session")
-def standard_20_bits() -> Simulation:
-    """The standard rig, linear truth, 20-bit encoder, 40.5 s at 1 kHz."""
-    return simulate(sensors=standard_sensors(20), truth="linear", duration=40.5, seed=1)

@@ -96,15 +96,6 @@ def standard_sensors(bits: int = 14) -> Sensors:
     return Sensors(2 * math.pi / 2**bits, 0.5, random_offset=True, y_lsb=5e-6, y_noise_lsb=0.4)
 
 
-def standard_start(seed: int) -> Float:
-    """(w, d1, d2) within +-50 % of the standard rig's, and of a pendulum."""
-    random = np.random.default_rng([seed, 1])
-    while True:
-        start = np.asarray(STANDARD_PENDULUM.linear * random.uniform(0.5, 1.5, 3))
-        if start[1] - start[2] > 1:
-            return start
-
-
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """What the sensors read, and the true state [n, 4]: angles and their rates."""

@@ -39,7 +39,7 @@ def _long(board: str, name: str, core: str) -> Any:
         ("mps2-an386", "cart_pendulum", "f32"),
         ("virt-rv32imac", "battery_2rc", "q31"),  # the pendulum: test_targets.py
         ("microbit", "dc_motor", "q31"),  # its short products have less room than those of other cores
-        _long("virt-rv32imac", "battery_2rc", "f32"),
+        *(_long(board, "battery_2rc", "f32") for board in ("virt-rv32imac", "microbit")),  # soft float
         *(_long(board, "two_link_arm", "f32") for board in ("mps3-an547", "virt-rv32imafc")),
         *(_long("mps2-an386", name, "f32") for name in KINDS if name != "cart_pendulum"),
         *(_long("mps2-an386", name, "q31") for name in KINDS),

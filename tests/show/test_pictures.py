@@ -1,6 +1,6 @@
 """What a person sees of a recording fits the screen: an 80 x 24 terminal, a window of 1280 x 800, a page of paper.
 
-PVID_PICTURES=folder ./tools/pvid bench long --only show      leaves the pictures there, to be looked at
+PVID_PICTURES=folder ./tools/test --long tests/show/test_pictures.py      leaves the pictures there, to be looked at
 """
 
 from __future__ import annotations

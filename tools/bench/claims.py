@@ -47,8 +47,6 @@ def quoting(command: str, tables: list[str]) -> list[str]:
 def short_form(place: str) -> str:
     """The test that imports the case's module."""
     module = place.partition(":")[0]
-    if module == "long":
-        return "tests/"
     uses = re.compile(rf"from bench\.{module} import|from bench import [\w, ]*\b{module}\b")
     paths = sorted((ROOT / "tests").glob("*/test_*.py"), key=lambda path: (path.parent.name != "bench", path))
     found: Iterator[Path] = (path for path in paths if uses.search(path.read_text(encoding="utf-8")))

@@ -131,13 +131,6 @@ CASES = (
         ("fuzz-api",),
         (option("--calls", 10_000_000), option("--seed", 1)),
     ),
-    Case(
-        "long",
-        "The long forms of the tests: 40 000 ticks, every build and board, mutants (an hour).",
-        "long",
-        ("long",),
-        (click.Option(["--only"], metavar="ROOM", multiple=True, help="A folder of tests/; may be given again."),),
-    ),
 )
 
 # Measured once: the tables stay, the code is in the history, at the commit in their heads.
@@ -206,6 +199,12 @@ FROZEN = (
         "Frames a minute of processor time through `pvid log`, losses, memory.",
         ("log",),
         "tests/log/test_log.py",
+    ),
+    Frozen(
+        "long",
+        "The long forms of the tests: 40 000 ticks, every build and board (`./tools/test night`).",
+        ("long",),
+        "tools/test",
     ),
     Frozen(
         "random-models",

@@ -265,7 +265,6 @@ def of_robustness() -> list[str]:
     """Sentences below the figure."""
     accidents, longevity = results_of("accidents"), results_of("longevity")
     link, api = sums_of("fuzz-link"), sums_of("fuzz-api")
-    long = results_of("long").column("result")
     marked = sum("**" in cell or "NOT" in cell for row in longevity.rows for cell in row)
     return [
         f"- Accidents: {sum(map(int, accidents.column('wrong, no warning')))} wrong answers without a warning in "
@@ -275,7 +274,6 @@ def of_robustness() -> list[str]:
         f"{api['runs of garbage with valid settings']} runs of garbage published an estimate.",
         f"- `bench longevity`: {len(longevity.rows)} rows of a million ticks, {marked} cells silently wrong or not "
         "finite.",
-        f"- `bench long`, the long tests: {long.count('passed')} of {len(long)} passed.",
     ]
 
 
