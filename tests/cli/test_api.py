@@ -6,6 +6,7 @@ import importlib
 import os
 import subprocess
 import sys
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -91,8 +92,13 @@ def test_data_that_say_nothing_have_an_answer_without_parameters() -> None:
     ("data", "keys", "sentence"),
     [
         (3, {"l1": 0.3}, "data: a path, a data frame, a structured array or a mapping of arrays is wanted, not int"),
-        ({"t": [0, 1], "phi": [0, 1]}, {"l1": 0.3}, "no column y"),
-        ({"t": [0, 1], "phi": [0, 1], "y": [0, 1]}, {}, "l1 .m. of the rig is missing"),
+        ({"t": [0, 1], "phi": [0, 1]}, {"l1": 0.3}, 'no column y.* use columns="y=NAME:m"\\.'),
+        ({"t": [0, 1], "phi": [0, 1], "y": [0, 1]}, {}, "l1 .m. of the rig is missing: use l1=0.3 with"),
+        ({"t": [0, 1], "phi": [0, 1], "y": [0, 1]}, {"columns": {"q": "a"}}, "no shipped mechanism has these"),
+        ({"t": [0, 1], "q": [0, 1]}, {"model": "free_pendulum", "columns": {"a": "q"}}, "^columns: 'a' is no signal; "),
+        ({"t": [0, 1], "phi": [0, 1], "y": [0, 1]}, {"columns": ["t"]}, "^columns: a text is wanted, .*not list"),
+        ({"t": [0, 1], "phi": [0, 1], "y": [0, 1]}, {"sensor": 3}, "sensor must be a table"),
+        ({"t": [0, 1]}, {}, "name yours with model=\\.\\.\\., and its columns with columns=\\.\\.\\.;"),
         ({"t": [0, 1], "phi": ["a", "b"], "y": [0, 1]}, {"l1": 0.3}, "row 1, column phi: 'a' is not a number"),
         ({"t": np.arange(9) / 1e3, "phi": np.zeros(8), "y": np.zeros(9)}, {"l1": 0.3}, "have"),
         ("nowhere.csv", {"l1": 0.3}, "nowhere.csv does not exist"),
@@ -115,7 +121,7 @@ def test_a_mechanism_of_the_list_is_identified(tmp_path: Path) -> None:
 
 
 def test_a_model_file_is_identified_and_advice_is_part_of_the_result() -> None:
-    name, sentence = "heated_plate", "P seems to have the opposite sign: --columns P=P:-1 (or T: --columns T=T:-1)"
+    name, sentence = "heated_plate", 'P seems to have the opposite sign: columns="P=P:-1" (or T: columns="T=T:-1")'
     recording, model = own_recording(name), OWN[name].path
     data = {"t": recording.t, **recording.signals}
     for result in (pvid.identify(data, model=model), pvid.identify(data, model=model, core="f32")):
@@ -123,8 +129,9 @@ def test_a_model_file_is_identified_and_advice_is_part_of_the_result() -> None:
         for one in OWN[name].compiled.unknowns:
             assert abs(result[one.name].value - one.guess) < 4 * result[one.name].se
     wrong = pvid.identify(data, model=model, columns="P=P:-1")
-    assert wrong.advice == (sentence,) and wrong.details["advice"] == [sentence]
-    assert f"advice: {sentence}" in str(wrong) and sentence in wrong._repr_html_()
+    assert wrong.advice == (sentence,) and f"advice: {sentence}" in str(wrong)
+    assert wrong.details["advice"] == ["P seems to have the opposite sign: --columns P=P:-1 (or T: --columns T=T:-1)"]
+    assert escape(sentence) in wrong._repr_html_()
 
 
 def test_the_estimator_takes_a_model_of_ones_own() -> None:

@@ -129,6 +129,22 @@ def test_a_result_is_saved_and_loaded(found: pvid.Result, tmp_path: Path) -> Non
         pvid.load(path, model=plate())
 
 
+def test_other_recordings_have_the_columns_of_the_identification(tmp_path: Path) -> None:
+    """By a text and by a mapping; a name may hold what separates the parts of a text."""
+    own = data()
+    other = {"time, ms": 1e3 * own["t"], "P": own["P"], 'a: "T"': own["T"]}
+    columns: dict[str, str | int] = {"t": "time, ms:ms", "T": 'a: "T":K', "P": 2}
+    result = pvid.identify(other, model=PLATE, columns=columns)
+    assert result["C"].value == pytest.approx(pvid.identify(own, model=PLATE)["C"].value, rel=1e-6)
+    found = result.validate(other)
+    assert found.sensors == result.validate(own, columns={}).sensors
+    assert str(found) == repr(found) == found.text and found.text.startswith("predicts T to ")
+    again = pvid.load(result.save(tmp_path / "a.json"), model=PLATE)
+    assert again.validate(other).sensors == found.sensors and len(again.predict(other)["T"])
+    with pytest.raises(PvidError, match=r"no column 'time, ms' for t .* use columns="):
+        result.validate(own)
+
+
 def test_a_frame_needs_pandas(found: pvid.Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(PvidError, match="to_frame needs pandas"):

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from pvid.api.data import Data, named
 from pvid.api.result import Result, result_of
+from pvid.api.words import columns_text, words_of_python
 from pvid.base.errors import PvidError
 from pvid.identification.analysis import own_of
 from pvid.identification.core import identify_in_c
@@ -31,7 +32,7 @@ def identify(
     *,
     model: str | os.PathLike[str] | Model | None = None,
     rig: str | os.PathLike[str] | None = None,
-    columns: str | None = None,
+    columns: str | Mapping[str, str | int] | None = None,
     core: Literal["f32", "q31", "f64"] | None = None,
     refine: bool | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -53,7 +54,8 @@ def identify(
     rig
         The rig file; RUN.toml beside RUN.csv by default.
     columns
-        Names and units of the columns, as for `--columns`: "t=time_ms:ms,phi=angle:deg,y=h:mm".
+        Names and units of the columns, as for `--columns`: "t=time_ms:ms,phi=angle:deg,y=h:mm", or a mapping with the
+        same columns: {"t": "time_ms:ms", "phi": "angle:deg"}. The result keeps them for other recordings.
     core
         Arithmetic: float64 by default; the C core in f32 or q31 is compiled for the mechanism.
     refine
@@ -80,8 +82,9 @@ def identify(
     >>> pvid.identify("run.csv", l1=0.25)["g"].value  # doctest: +SKIP
     """
     # Matrices are small: threads would wait for each other, on all cores.
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _identify(data, model, rig, columns, core, refine, {**(settings or {}), **keys}, own, shared)
+    with words_of_python(), threadpool_limits(limits=1, user_api="blas"):
+        given = {**(settings or {}), **keys}
+        return _identify(data, model, rig, columns_text(columns), core, refine, given, own, shared)
 
 
 def _identify(
@@ -116,7 +119,7 @@ def _identify(
     answer = identified(recording, compiled, refine=False if in_c else refine, own=of_each)
     options = {"model": model, "rig": rig, "columns": columns, "core": core, "refine": refine, **settings}
     made = Made.of(_call(paths, options), files, rig_path, found)
-    return result_of(answer if in_c is None else identify_in_c(answer, in_c.name), made)
+    return result_of(answer if in_c is None else identify_in_c(answer, in_c.name), made, columns)
 
 
 def _call(paths: Sequence[Path | None], options: Mapping[str, Any]) -> str:

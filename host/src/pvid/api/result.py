@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.api.data import Data, recording_of
+from pvid.api.words import columns_text, in_python, words_of_python
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.packages import installing
@@ -107,6 +108,7 @@ class Result:
     _model: CompiledModel
     _answer: Answer | None = None
     _made: Made = Made("")
+    _columns: str | None = None
 
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -194,7 +196,7 @@ class Result:
         PvidError
             Where the result was loaded from a file.
         """
-        return summary(self._identified_here("words"))
+        return in_python(summary(self._identified_here("words")))
 
     def to_frame(self) -> Any:
         """A data frame (pandas) with a row for each parameter: value, se, low and high of the 95 % interval, unit,
@@ -231,6 +233,7 @@ class Result:
             When it cannot be written, or there is such a file.
         """
         own = {"covariance": self.covariance.tolist(), "names": list(self.parameters), "rig": self._made.settings}
+        own["columns"] = self._columns
         out = Path(path)
         with replacing(force), _writing(out):
             write_whole(out, json.dumps({**self.details, "saved": own | {"notes": list(self.notes)}}) + "\n")
@@ -286,13 +289,15 @@ class Result:
             write_figure(self._identified_here("figure"), out)
         return out
 
-    def validate(self, data: Data, *, columns: str | None = None) -> Validation:
+    @words_of_python()
+    def validate(self, data: Data, *, columns: str | Mapping[str, str | int] | None = None) -> Validation:
         """How well these parameters predict another recording of the mechanism: blocks of it are simulated by the full
         equations, from starts that are fitted.
 
         Parameters
         ----------
-        data, columns : as of `pvid.identify`
+        data : as of `pvid.identify`
+        columns : as of `pvid.identify`; None: those of the identification; {}: columns have the names of the signals
 
         Returns
         -------
@@ -305,13 +310,15 @@ class Result:
         """
         return self._validated(self._recording(data, columns))
 
-    def predict(self, data: Data, *, columns: str | None = None) -> dict[str, Float]:
+    @words_of_python()
+    def predict(self, data: Data, *, columns: str | Mapping[str, str | int] | None = None) -> dict[str, Float]:
         """The sensors as these parameters predict them: the whole recording is simulated by the full equations under
         its recorded inputs, from the start that fits it best.
 
         Parameters
         ----------
-        data, columns : as of `pvid.identify`
+        data : as of `pvid.identify`
+        columns : as of `pvid.identify`; None: those of the identification; {}: columns have the names of the signals
 
         Returns
         -------
@@ -327,9 +334,10 @@ class Result:
 
         return simulation_of(self._model, self._recording(data, columns), p_of(self._model, self.params))
 
-    def _recording(self, data: Data, columns: str | None) -> Recording:
+    def _recording(self, data: Data, columns: str | Mapping[str, str | int] | None) -> Recording:
         path = Path(data) if isinstance(data, str | os.PathLike) else None
-        return recording_of(data, path, None, parsed(columns, channels_of(self._model)))
+        given = self._columns if columns is None else columns_text(columns)
+        return recording_of(data, path, None, parsed(given, channels_of(self._model)))
 
     def compare(self, other: Result) -> dict[str, float]:
         """By parameter: this value less the other's, in standard errors of the difference.
@@ -350,13 +358,15 @@ class Result:
         return self[name].se if noise is None else math.hypot(noise, model or 0.0)
 
 
-def result_of(found: Answer, made: Made | None = None) -> Result:
+def result_of(found: Answer, made: Made | None = None, columns: str | None = None) -> Result:
     """What a user sees of an answer."""
     details = found.as_json()
     notes = (*found.recording.notes, *(one.text for one in found.verdict.reasons if not one.alarm))
-    return _of_details(details, notes, found.covariance_of_values, found.model, found, made or Made(""))
+    covariance = found.covariance_of_values
+    return _of_details(details, notes, covariance, found.model, found, made or Made(""), columns)
 
 
+@words_of_python()
 def load(path: str | os.PathLike[str], *, model: str | os.PathLike[str] | Model | None = None) -> Result:
     """A result that `Result.save` wrote. It predicts and validates; what needs its recording, it does not have.
 
@@ -383,7 +393,8 @@ def _loaded(text: str, model: str | os.PathLike[str] | Model | None) -> Result:
         if details["model"] != of.name:
             raise PvidError(f"it is of the mechanism {details['model']}, not of {of.name}")
         covariance, notes = np.array(own["covariance"], np.float64), tuple(map(str, own["notes"]))
-        result = _of_details(details, notes, covariance, rig.applied(of), None, Made("", (), own["rig"]))
+        made, columns = Made("", (), own["rig"]), own.get("columns") and str(own["columns"])
+        result = _of_details(details, notes, covariance, rig.applied(of), None, made, columns)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise PvidError(f"{none}: {reason(error)}") from error
     if covariance.size != len(result.parameters) ** 2:
@@ -398,14 +409,17 @@ def _of_details(
     model: CompiledModel,
     answer: Answer | None,
     made: Made,
+    columns: str | None,
 ) -> Result:
     known = {
         name: Parameter(one["value"], one["se"], one["unit"], one["verdict"], one.get("below"))
         for name, one in details["parameters"].items()
         if details["identified"] and one["value"] is not None
     }
-    head = (details["identified"], known, details["verdict"], details["status"], details["warning"])
-    return Result(*head, tuple(details["advice"]), notes, details, covariance, model, answer, made)
+    warning = details["warning"] and in_python(details["warning"])
+    advice, notes = tuple(map(in_python, details["advice"])), tuple(map(in_python, notes))
+    head = (details["identified"], known, details["verdict"], details["status"], warning)
+    return Result(*head, advice, notes, details, covariance, model, answer, made, columns)
 
 
 @contextlib.contextmanager

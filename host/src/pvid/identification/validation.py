@@ -58,6 +58,11 @@ class Validation:
         with_own = f", with {listed(own)}" if own else ""
         return f"predicts {listed(self.sensors)}, in {self.blocks} blocks of {self.block_s:.3g} s{with_own}"
 
+    def __str__(self) -> str:
+        return self.text
+
+    __repr__ = __str__
+
     def as_json(self) -> dict[str, Any]:
         """The object of `validate --json`."""
         sensors = {one.name: one.as_json() for one in self.sensors}
