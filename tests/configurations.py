@@ -121,7 +121,6 @@ TRUST = {
     "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
     "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
-    "trust.neglected": Range(0.0, 1.0, Status.BAD_NEGLECTED),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.revert_after": Range(0, 65535, Status.OK),
 }
@@ -140,7 +139,6 @@ WEAK_Q31 = {
     "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
     "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
-    "trust.neglected": Range(0, 2**30, Status.BAD_NEGLECTED),
 }
 OWN = {
     **ESTIMATOR,
@@ -158,7 +156,7 @@ IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 WITHOUT = {"weights": Status.BAD_BANK, "model": Status.BAD_MODEL}
 SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}  # what a form's init fills in
 # Of the identifier: tests/core/test_weak_valid_q31.py, tests/unit/test_weak.c.
-ELSEWHERE = {"design", "refine", "range", "drive_min", "offset"}
+ELSEWHERE = {"design", "refine", "range", "drive_min", "offset", "trust.shared"}
 UNUSED = {
     "weak": SET_BY_INIT | {"estimator.correlation", "estimator.row_weight", "compensation"} | ELSEWHERE,
     "weak q31": SET_BY_INIT | {"estimator.row_weight", "compensation"} | ELSEWHERE,

@@ -35,6 +35,7 @@ def pointer_places(ffi: Any, ctype: Any, start: int = 0) -> Iterator[int]:
 # Lengths of the tables, from the struct that points to them and the model.
 _BOTH: dict[str, Length] = {
     "drive_min": lambda config, model: model.samples,
+    "trust.shared": lambda trust, model: model.model.n_p * (model.model.n_p + 1) // 2,
     "design": lambda config, model: 1,
     "design.model": lambda design, model: 1,
     "design.noise": lambda design, model: design.n_noise,

@@ -163,8 +163,9 @@ def printed(headers: Headers) -> str:
 def field_of(kind: Any, default: Any, required: bool) -> str:
     """Type and default of a field in Python."""
     floating = "float" in kind.cname
-    if kind.kind == "array":
-        return "npt.NDArray[np.float32]" if floating else "tuple[int, ...]"
+    if kind.kind in ("array", "pointer"):
+        table = "npt.NDArray[np.float32]" if floating else "tuple[int, ...]"
+        return table if kind.kind == "array" else f"{table} | None = None"
     if kind.kind == "enum":
         return f"Law = Law({int(default)})" if isinstance(default, int) else "Law = Law.STATIONARY"
     if required:

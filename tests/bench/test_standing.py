@@ -18,14 +18,18 @@ def test_a_wrong_value_is_beyond_five_errors_and_a_thousandth() -> None:
     assert wrong.tolist() == [False, True, False]
 
 
-def test_an_ideal_motor_is_valid_and_right_and_one_with_dead_time_is_not_valid(monkeypatch: pytest.MonkeyPatch) -> None:
-    few = {name: standing.IMPERFECTIONS[name] for name in ("none", "dead time 0.1 V")}
+def test_a_late_drive_or_a_wrong_gain_is_within_the_errors_and_dead_time_is_not_valid(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    late, gain = "PWM late by 0.1 tick", "gain of the current 1 % too large"
+    few = {name: standing.IMPERFECTIONS[name] for name in ("none", "dead time 0.1 V", late, gain)}
     monkeypatch.setattr(standing, "IMPERFECTIONS", few)
     rows = {row[0]: row for row in standing.imperfect_rows(2, 8.0, lambda: None)}
-    _, results, wrong, valid, both, _ = rows["none"]
-    assert int(valid) > 0.6 * int(results) > 10 and int(wrong) == int(both) == 0
-    _, results, wrong, valid, _, _ = rows["dead time 0.1 V"]
-    assert int(wrong) == int(results) > 10 and int(valid) == 0
+    for name, worst in (("none", 0.5), (late, 1.5), (gain, 1.5)):  # of standard deviations that are stated
+        _, results, wrong, valid, both, largest = rows[name]
+        assert int(valid) > 0.6 * int(results) > 10 and int(wrong) == int(both) == 0 and float(largest) < worst
+    _, results, _, valid, _, _ = rows["dead time 0.1 V"]
+    assert int(results) > 10 and int(valid) == 0
 
 
 def test_an_unplugged_sensor_leaves_nothing_wrong_and_valid() -> None:

@@ -181,11 +181,12 @@ def test_sensors_read_a_recording_over_and_over_where_it_is_wanted() -> None:
 
 
 def test_errors_of_a_board_without_a_recording_contain_what_small_angles_neglect() -> None:
-    """The square of the largest angle of the guess, as of a recorded one."""
+    """The square of the largest angle of the guess, as of a recorded one, and gains besides."""
     made = nominal_run(field_board.rig())
     phi = np.asarray(made.recording.signals["phi"])
     part = float(np.max(np.abs(phi - phi.mean()))) ** 2
     assert 1e-3 < part < 0.1
-    assert MechanismBoard.of_guess(field_board.rig()).config.trust.neglected == pytest.approx(part)
-    fixed = MechanismBoardQ31.of_guess(field_board.rig()).config.trust.neglected
-    assert fixed / 2**30 == pytest.approx(part, rel=1e-6)
+    shared = MechanismBoard.of_guess(field_board.rig()).config.trust.shared
+    assert shared is not None and part < shared[0] < np.hypot(part, 0.01)
+    fixed = MechanismBoardQ31.of_guess(field_board.rig()).config.trust.shared
+    assert fixed is not None and fixed[0] / 2**24 == pytest.approx(shared[0], rel=1e-6)

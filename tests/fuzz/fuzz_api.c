@@ -155,6 +155,7 @@ static struct {
     pvid_weak_design_f32 design;
     float circle[sizeof kapitza_circle / sizeof kapitza_circle[0]];
     float range[KAPITZA_WEAK_SAMPLES];
+    float shared[10];
     float variance[KAPITZA_WEAK_KINDS];
     pvid_weak_noise_f32 noise[sizeof kapitza_noise / sizeof kapitza_noise[0]];
 } weak;
@@ -184,6 +185,10 @@ static void spoil_tables(void)
         weak.range[1] = hostile_float();
         weak.config.range = weak.range;
     }
+    if (one_in(5)) {
+        weak.shared[below(10)] = hostile_float();
+        weak.config.trust.shared = weak.shared;
+    }
 }
 
 static void configure_weak(bool sound)
@@ -197,6 +202,7 @@ static void configure_weak(bool sound)
     config->estimator.forgetting_s = one_in(3) ? 5.0f : 0.0f;
     config->drive_min = one_in(4) ? NULL : config->drive_min;
     config->range = one_in(2) ? NULL : config->range;
+    config->trust.shared = one_in(4) ? NULL : config->trust.shared;
     config->compensation = !one_in(4);
     config->estimator.dead_zone = one_in(4) ? 1.0f : 0.0f;
     if (sound) {
@@ -204,7 +210,7 @@ static void configure_weak(bool sound)
     }
     float *const fields[] = {&config->sample_rate_hz,   &config->trust.kappa_min, &config->trust.se_max,
                              &config->trust.misfit_max, &config->trust.renewal,   &config->gate.sigmas,
-                             &config->gate.patience_s,  &config->trust.neglected, &weak.design.overlap};
+                             &config->gate.patience_s,  &weak.design.overlap};
     if (one_in(2)) {
         spoil(fields, sizeof fields / sizeof fields[0]);
     }
@@ -451,6 +457,7 @@ static struct {
     int32_t full_scale[KAPITZA_WEAK_SAMPLES];
     int32_t offset[KAPITZA_WEAK_SAMPLES];
     int32_t drive_min[KAPITZA_WEAK_SAMPLES];
+    int32_t shared[10];
     pvid_scaled_q31 factor[PENDULUM_TERMS];
     pvid_weak_noise_q31 noise[PENDULUM_NOISE];
 } weak_q31;
@@ -508,7 +515,8 @@ static void configure_weak_q31(bool sound)
     config->trust.se_max = one_in(6) ? any_size_i32() : config->trust.se_max;
     config->trust.misfit_max = one_in(6) ? (uint32_t)any_size_i32() : config->trust.misfit_max;
     config->trust.renewal = one_in(6) ? (uint32_t)any_size_i32() : config->trust.renewal;
-    config->trust.neglected = one_in(4) ? any_size_i32() : config->trust.neglected;
+    weak_q31.shared[below(10)] = any_size_i32();
+    config->trust.shared = one_in(4) ? weak_q31.shared : config->trust.shared;
     spoil_tables_q31();
     pvid_weak_design_q31 *design = &weak_q31.design;
     design->functions = one_in(8) ? any_size(design->functions, PVID_MAX_FUNCTIONS) : design->functions;

@@ -12,8 +12,9 @@ from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak import reversals
 from pvid.oracle.weak.blur import blur_of, rates_of_drives
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.identify import identify, neglected, ready
+from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.rows import WeakRows, WhiteRows
+from pvid.oracle.weak.shared import neglected
 from pvid.oracle.weak.starts import starts_about
 from pvid.sim.simulated_run import simulation_of
 

@@ -33,11 +33,13 @@ void main(void)
     identifier.accumulator.design = &weak_design;
     identifier.accumulator.front.offset = limits;
     identifier.drive_min = limits;
+    identifier.trust.config.shared = limits;
     identifier.estimator.model = &model;
     Frama_C_make_unknown((char *)image, sizeof image);
     (void)pvid_snapshot_restore_weak_q31(&identifier, &weak_config, image, any_u32(0, sizeof image));
     /*@ assert identifier.design == &weak_design && identifier.accumulator.design == &weak_design; */
     /*@ assert identifier.accumulator.front.offset == &limits[0] && identifier.drive_min == &limits[0]; */
+    /*@ assert identifier.trust.config.shared == &limits[0]; */
     /*@ assert identifier.estimator.model == &model; */
     (void)pvid_snapshot_save_weak_q31(&identifier, &weak_config, any_u32(0, UINT32_MAX), image,
                                       any_u32(0, sizeof image));

@@ -8,10 +8,13 @@
 #include "pvid/trust_q31.h"
 
 #define VARIANCE_RATIO_MAX (1000000LL << PVID_VARIANCE_RATIO_BITS)
+#define RECENT_MAX 1024000000
 
 static pvid_estimator_q31 estimator;
 static const pvid_model_q31 most = {.n_theta = 8, .n_p = PVID_MAX_P, .positive = 7u};
 static const pvid_model_q31 few = {.n_theta = 5, .n_p = 3, .positive = 7u};
+
+static int32_t shared[(PVID_MAX_P * (PVID_MAX_P + 1)) / 2];
 
 static void any_estimator(const pvid_model_q31 *model)
 {
@@ -62,6 +65,8 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     pvid_estimate_q31 candidate;
     pvid_trust_config_q31 config;
     Frama_C_make_unknown((char *)&config, sizeof config);
+    Frama_C_make_unknown((char *)shared, sizeof shared);
+    config.shared = any_bool() ? shared : NULL;
     any_estimator(model);
     if (pvid_trust_init_q31(&trust, &config, &estimator) != PVID_OK) {
         return;
@@ -79,7 +84,7 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     trust.misfit = any_bool();
     trust.long_mean = any_i64(-VARIANCE_RATIO_MAX, VARIANCE_RATIO_MAX);
     for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
-        trust.recent[i] = any_i64(-VARIANCE_RATIO_MAX, VARIANCE_RATIO_MAX);
+        trust.recent[i] = any_i32(-RECENT_MAX, RECENT_MAX);
     }
     any_standing(&trust.standing);
     for (size_t a = 0; a < PVID_MAX_P; a++) {
@@ -98,8 +103,8 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
     pvid_trust_skip_q31(&trust, any_bool());
     (void)pvid_trust_start_q31(&trust, &estimator, PVID_UPDATED, p);
     /*@ assert -VARIANCE_RATIO_MAX <= trust.long_mean <= VARIANCE_RATIO_MAX; */
-    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] >= -VARIANCE_RATIO_MAX; */
-    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] <= VARIANCE_RATIO_MAX; */
+    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] >= -RECENT_MAX; */
+    /*@ assert \forall integer i; 0 <= i < PVID_TRUST_SHORT ==> trust.recent[i] <= RECENT_MAX; */
     /*@ assert trust.next < PVID_TRUST_SHORT; */
 }
 

@@ -90,7 +90,7 @@ def test_settings_come_before_the_file() -> None:
         ("sensor = []\n[model]\nname='x'", "sensor must be a table, [sensor], not '[]'"),
         (
             "[model]\nname='x'\n[sensor.phi]\nbits=3",
-            "'bits' is not a key: resolution, noise, gain_sd, neglected, delay and reach are",
+            "'bits' is not a key: resolution, noise, gain_sd, delay_sd, offset_sd, neglected, delay and reach are",
         ),
         ("[model]\nname='x'\n[sensor.phi]\nnoise=-3", "sensor.phi.noise must not be negative"),
         (
@@ -114,7 +114,10 @@ def test_a_mistake_is_named(text: str, sentence: str) -> None:
     [
         ({"known": {"h": 1.0}}, "known.h: the model has no 'h'; it has g"),
         ({"sensor": {"U": {"noise": 1.0}}}, "sensor.U: the model has no 'U'; it has V and phi"),
-        ({"sensor": {"V": {"noise": 1.0}}}, "sensor.V: an input of the model has gain_sd and reach alone"),
+        (
+            {"sensor": {"V": {"noise": 1.0}}},
+            "sensor.V: an input of the model has gain_sd, delay_sd, offset_sd and reach alone",
+        ),
         ({"nominal": {"L": 1.0}}, "nominal.L: the model has no 'L'; it has R and i0"),
         ({"nominal": {"R": -1.0}}, "nominal.R must be positive, not -1"),
         ({"refine": {"slant": True}}, "refine.slant: the model has no 'slant'; it has stiction"),

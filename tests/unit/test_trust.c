@@ -42,9 +42,13 @@ static const pvid_model_f32 model = {.n_theta = 4,
                                      .theta = theta_of,
                                      .jacobian = jacobian_of};
 
+static float shared[10];
+static double moved;
+
 static int start_again(void **state)
 {
     (void)state;
+    moved = 0.0;
     pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
     config.model = &model;
     for (int i = 0; i < 4; i++) {
@@ -65,8 +69,8 @@ static an_estimate candidate(double error, double kappa)
     an_estimate estimate;
     memset(&estimate, 0, sizeof estimate);
     for (int i = 0; i < 4; i++) {
-        estimate.p[i] = 20.0f;
-        estimate.se[i] = 20.0f * (float)error;
+        estimate.p[i] = 20.0f * (1.0f + (float)moved);
+        estimate.se[i] = estimate.p[i] * (float)error;
     }
     estimate.kappa = (float)kappa;
     estimate.least_pivot = 1.0e-2f;
@@ -118,9 +122,18 @@ static void begin_anew(void)
     pvid_trust_begin_anew_f32(&trust, &estimator);
 }
 
-static void set_neglected(double part)
+static void share(double relative, double fourth, double correlation)
 {
-    trust.config.neglected = (float)part;
+    const float sd = (float)relative;
+    const float beside = (float)correlation;
+    const float own[10] = {sd, beside, beside, 0, sd, beside, 0, sd, 0, (float)fourth};
+    memcpy(shared, own, sizeof shared);
+    trust.config.shared = shared;
+}
+
+static void move(double part)
+{
+    moved = part;
 }
 
 static double published_error(int a)

@@ -767,6 +767,7 @@ static void init_names_what_is_out_of_range(void **state)
     REFUSES(config.iterations = 0, PVID_BAD_ITERATIONS);
     REFUSES(config.estimator.start[0] = -1.0f, PVID_BAD_START);
     REFUSES(config.trust.se_max = 0.0f, PVID_BAD_SE_MAX);
+    REFUSES(config.trust.shared = not_a_number, PVID_BAD_SHARED);
     REFUSES(config.gate.sigmas = 1.0f, PVID_BAD_GATE_SIGMAS);
     assert_int_equal(pvid_weak_init_f32(&self, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_weak_init_f32(NULL, &config), PVID_BAD_POINTER);

@@ -28,8 +28,10 @@ static double fade_factor(void);
 /* The mechanism has changed. */
 static void begin_anew(void);
 
-/* Sets trust.config.neglected. Then what is published: a standard error, a correlation. */
-static void set_neglected(double part);
+/* Shared errors: standard deviations of the first three and of the fourth parameter, and the correlation of the former.
+ * The next estimates are p = 20 (1 + part). Then what is published: a standard error, a correlation. */
+static void share(double relative, double fourth, double correlation);
+static void move(double part);
 static double published_error(int a);
 static double published_correlation(int a, int b);
 
@@ -270,33 +272,45 @@ static void the_alarm_can_be_switched_off(void **state)
     }
 }
 
-/* se^2 of p = 20 +- 1 % becomes 1 %^2 + 3 %^2, of which nine tenths are common to the positive parameters. */
-static void neglected_terms_join_what_is_published(void **state)
+/* se^2 of p = 20 +- 1 % becomes 1 %^2 + 3 %^2, of which nine tenths are common to the positive parameters; that of the
+ * fourth 0.2^2 + 0.5^2. */
+static void shared_errors_join_what_is_published(void **state)
 {
     (void)state;
-    set_neglected(0.03);
+    share(0.03, 0.5, -0.5);
     for (int i = 0; i < 4; i++) {
         (void)judge_good(1.0);
     }
     for (int a = 0; a < 3; a++) {
         assert_true(fabs(published_error(a) - 0.632456) < 1.0e-5);
-        assert_true(fabs(published_correlation(a, (a + 1) % 3) - 0.9) < 1.0e-5);
+        assert_true(fabs(published_correlation(a, (a + 1) % 3) + 0.45) < 1.0e-5);
         assert_true(fabs(published_correlation(a, 3)) < 1.0e-9);
     }
-    assert_true(fabs(published_error(3) - 0.2) < 1.0e-5);
+    assert_true(fabs(published_error(3) - 0.538516) < 1.0e-5);
 }
 
-/* They are no reason to hold an estimate, however large they are. */
-static void neglected_terms_hold_nothing(void **state)
+/* They are no reason to hold an estimate, however large they are, and no excuse: windows share them, so that an
+ * estimate that is more than five of the other errors away contradicts. */
+static void shared_errors_neither_hold_nor_excuse(void **state)
 {
     (void)state;
-    set_neglected(1.0);
+    share(1.0, 0.0, 1.0);
     for (int i = 0; i < 4; i++) {
         (void)judge_good(1.0);
     }
     assert_int_equal(judge_good(1.0), PVID_UPDATED);
     assert_true(published_error(0) > 20.0);
-    set_neglected(0.0);
+    move(0.065); /* 6.5 / sqrt(1 + 1.065^2) is 4.4 */
+    assert_int_equal(judge(PVID_UPDATED, 0.02, true, 1.0, candidate(0.01, 1.0e-2)), PVID_HELD_UNCERTAIN);
+    assert_false(trust.standing.contradicts);
+    move(0.08); /* 5.4 */
+    assert_int_equal(judge(PVID_UPDATED, 0.02, true, 1.0, candidate(0.01, 1.0e-2)), PVID_HELD_UNCERTAIN);
+    assert_true(trust.standing.contradicts);
+    assert_false(trust.standing.grew);
+    assert_int_equal(judge(PVID_UPDATED, 0.02, true, 1.0, candidate(0.04, 1.0e-2)), PVID_HELD_UNCERTAIN);
+    assert_true(trust.standing.grew);
+    move(0.0);
+    trust.config.shared = NULL;
     assert_int_equal(judge_good(1.0), PVID_UPDATED);
     assert_true(fabs(published_error(0) - 0.2) < 1.0e-5);
 }
@@ -316,7 +330,7 @@ static void neglected_terms_hold_nothing(void **state)
         cmocka_unit_test_setup(a_changed_mechanism_begins_the_sums_anew, start_again),                                 \
         cmocka_unit_test_setup(expected_residuals_raise_no_alarm, start_again),                                        \
         cmocka_unit_test_setup(the_alarm_can_be_switched_off, start_again),                                            \
-        cmocka_unit_test_setup(neglected_terms_join_what_is_published, start_again),                                   \
-        cmocka_unit_test_setup(neglected_terms_hold_nothing, start_again),
+        cmocka_unit_test_setup(shared_errors_join_what_is_published, start_again),                                     \
+        cmocka_unit_test_setup(shared_errors_neither_hold_nor_excuse, start_again),
 
 #endif

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.weak import samples_of, weak_config
-from pvid.configuration.weak_q31 import weak_q31_for_run, with_neglected
+from pvid.configuration.weak_q31 import weak_q31_for_run
 from pvid.core.native import Publisher
 from pvid.core.weak_native import WeakIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
@@ -148,10 +148,9 @@ def _published(identifier: Publisher, record: Record) -> tuple[npt.NDArray[Any],
 
 
 def board_of(
-    compiled: CompiledModel, run: Signals, design: WeakDesign, p: Float, core: Core, neglected: float = 0.0
+    compiled: CompiledModel, run: Signals, design: WeakDesign, p: Float, core: Core, shared: bool = False
 ) -> FloatBoard | FixedBoard:
-    """Settings from a run of the rig, at parameters near its own [n_p]; neglected: as in trust.h."""
+    """Settings from a run of the rig, at parameters near its own [n_p]; shared: as of weak_config."""
     if core == "q31":
-        return FixedBoard(with_neglected(weak_q31_for_run(compiled, run, design, p), neglected))
-    config = weak_config(compiled, run, design, p)
-    return FloatBoard(compiled, replace(config, trust=replace(config.trust, neglected=neglected)))
+        return FixedBoard(weak_q31_for_run(compiled, run, design, p, shared=shared))
+    return FloatBoard(compiled, weak_config(compiled, run, design, p, shared=shared))

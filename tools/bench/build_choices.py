@@ -34,7 +34,7 @@ class Choice:
         return "mps2-an386" if self.core == "f32" else "microbit"
 
 
-_PARTS = {f"PVID_{one}": 1 for one in ("REFINEMENT", "DEAD_ZONE", "FEEDBACK", "NEGLECTED")}
+_PARTS = {f"PVID_{one}": 1 for one in ("REFINEMENT", "DEAD_ZONE", "FEEDBACK", "SHARED")}
 _USUAL = {"CMAKE_BUILD_TYPE": "RelWithDebInfo", "PVID_COLD_OPTIONS": ""}
 _COLD = {"PVID_COLD_OPTIONS": "-Os"}
 _SMALL = {"CMAKE_BUILD_TYPE": "MinSizeRel"}
@@ -48,7 +48,7 @@ CHOICES = (
         sizes=_PARTS | {"PVID_CHECK_TABLES": 1},
     ),
     Choice("and no check of the printed tables: `PVID_CHECK_TABLES=0`", sizes=_PARTS),
-    Choice("and no second stage, no dead zone, no law with g < 1, no neglected terms: what `pvid model build` prints"),
+    Choice("and no second stage, no dead zone, no law with g < 1, no shared errors: what `pvid model build` prints"),
     Choice("and `-DPVID_COLD_OPTIONS=-Os`", options=_COLD),
     Choice("or all of it with `-Os` (`MinSizeRel`)", options=_SMALL),
     Choice("both stages, as printed", refined=True),

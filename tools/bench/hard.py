@@ -20,7 +20,6 @@ from scipy import stats
 from bench.board_weak import Answer, FixedBoard, FloatBoard, board_of
 from bench.case import columns
 from bench.mechanisms import design_of, size_of, start_of
-from pvid.configuration.weak import neglected_part
 from pvid.models.drive import Drive, Scaled
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
@@ -109,7 +108,7 @@ def board(name: str, core: Core, coarser: float, whole: bool = False) -> FloatBo
     neglect is part of the standard errors, by the largest of the recorded signals."""
     of = simulation_for(name, Case("", coarser=coarser, whole=whole))
     run = of.run(0)
-    return board_of(of.model, run, design_of(of, PERFECT), of.truth, core, neglected_part(of.model, run))
+    return board_of(of.model, run, design_of(of, PERFECT), of.truth, core, shared=True)
 
 
 def answer_of(name: str, case: Case, seed: int, core: Core = "f32") -> Answer:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.case import Advance, Report, chosen
 from pvid.codegen.weak_library import weak_native
-from pvid.configuration.weak import config_for_simulated_rig, samples_of
+from pvid.configuration.weak import config_for_rig_like_the_shipped, samples_of
 from pvid.models.mechanisms import compiled_of
 from pvid.settings.enums import Reason, Standing
 from pvid.settings.record import Record
@@ -61,7 +61,7 @@ class Board:
 @cache
 def board(name: str) -> Board:
     """Of a shipped mechanism."""
-    return Board(simulation_of(name), config_for_simulated_rig(compiled_of(name)))
+    return Board(simulation_of(name), config_for_rig_like_the_shipped(compiled_of(name)))
 
 
 def state_of(record: Record) -> npt.NDArray[np.uint32]:

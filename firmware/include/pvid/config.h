@@ -247,7 +247,7 @@
 
 /* Parts that a design or its settings may not need; 0 leaves a part out, for less flash. `pvid model build` prints
  * them. init refuses settings that need a part that is left out: a dead zone with PVID_BAD_DEAD_ZONE, g < 1 with
- * PVID_BAD_FEEDBACK, neglected terms with PVID_BAD_NEGLECTED, a second stage with PVID_BAD_POINTER. */
+ * PVID_BAD_FEEDBACK, shared errors with PVID_BAD_SHARED, a second stage with PVID_BAD_POINTER. */
 #ifndef PVID_DEAD_ZONE /* dead zone of estimator.h */
 #define PVID_DEAD_ZONE 1
 #endif
@@ -260,11 +260,11 @@
 #if PVID_FEEDBACK != 0 && PVID_FEEDBACK != 1
 #error "PVID_FEEDBACK must be 0 or 1"
 #endif
-#ifndef PVID_NEGLECTED /* errors from neglected terms (trust.h) */
-#define PVID_NEGLECTED 1
+#ifndef PVID_SHARED /* errors that all windows share (trust.h) */
+#define PVID_SHARED 1
 #endif
-#if PVID_NEGLECTED != 0 && PVID_NEGLECTED != 1
-#error "PVID_NEGLECTED must be 0 or 1"
+#if PVID_SHARED != 0 && PVID_SHARED != 1
+#error "PVID_SHARED must be 0 or 1"
 #endif
 #ifndef PVID_REFINEMENT /* second stage of weak.h */
 #define PVID_REFINEMENT 1

@@ -49,7 +49,7 @@ typedef enum {
     PVID_BAD_DRIVE_TICKS,   /* rows_per_second of a q31 strong form: outside 1..2^30 */
     PVID_BAD_FORMAT,        /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
     PVID_BAD_RENEWAL,       /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
-    PVID_BAD_NEGLECTED,     /* of trust.h: outside 0..1 */
+    PVID_BAD_SHARED,        /* of trust.h: a standard deviation or correlation out of its range */
     PVID_BAD_POINTER,       /* the object, the configuration or the bank is NULL */
     PVID_BAD_LAYOUT, /* library and application were compiled with different sizes: layout.h; nothing was written */
     PVID_BAD_EXCITE_PARTS,     /* of an excitation: none or too many, an unknown kind, or steps without levels */

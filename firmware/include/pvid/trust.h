@@ -22,9 +22,10 @@
  * Beginning anew. When an equation's own error turns out to be larger, almost nothing of the old sums remains. p stays.
  * The published estimate is held until p passes the checks of a first publication.
  *
- * Neglected terms. Residuals do not show a small error of the equations, and more data do not reduce the error of p
- * that it causes. `neglected` is therefore added to the published standard errors, the same share of each positive
- * parameter. Whether an estimate is published does not depend on it.
+ * Shared errors. A gain, a delay or an offset of a signal, a constant, the clock and a term that the equations neglect
+ * move p by the same in all windows: residuals hardly show it, and more data do not reduce it. The host computes what
+ * they do for the motion that the design is for; `shared` is that, and is added to the published standard errors.
+ * Whether an estimate is published, and its comparison with later windows (standing.h), does not depend on it.
  *
  * Standing. Behind every window the published estimate is compared with the candidate, and may be doubted or withdrawn:
  * standing.h. When the gate opens, or when several windows lead to no publication although p does not fit them, p
@@ -58,11 +59,12 @@ typedef struct {
     float renewal;    /* relative change, 0.01..1e3; 0: never. The old sums are renewed when a positive parameter has
                          converged this far from its value at their rows, and the residual variance of all rows is above
                          the alarm's limit */
-    float neglected; /* relative error of the positive parameters because the equations are approximate, for example for
-                        small angles, 0..1; 0: they are exact */
+    const float *shared; /* [n_p (n_p + 1) / 2] shared errors, the upper triangle by rows. On the diagonal standard
+                            deviations, 0..1e9: of a positive parameter relative to p, else in the unit of p; beside it
+                            their correlations, -1..1. NULL: none. Must outlive the identifier */
 } pvid_trust_config_f32;
 
-/* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %, neglected 0. */
+/* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %, no shared errors. */
 extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 
 /* State: detail/trust_state.h, not API. Only the functions below write to it. */
@@ -108,7 +110,7 @@ const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self);
  *   above_noise:     of the assessment
  *   variance_ratio:  residual variance of the group over its expectation
  *   freedom:         rows of the group less nuisances
- *   candidate:       the assessed estimate; the published copy also contains the neglected terms
+ *   candidate:       the assessed estimate; the published copy also contains the shared errors
  * Returns a reason of the table above and counts it. */
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
                                  bool above_noise, float variance_ratio, uint16_t freedom,

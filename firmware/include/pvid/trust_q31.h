@@ -25,8 +25,8 @@ typedef struct {
     uint16_t
         revert_after; /* consecutive uninformative groups after which p reverts to the published estimate; 0: never */
     uint32_t renewal; /* relative change of p after which the old sums are renewed, Q16, 0.01..1e3; 0: never */
-    int32_t
-        neglected; /* relative error of the positive parameters because the equations are approximate, Q30, 0..2^30 */
+    const int32_t *shared; /* [n_p (n_p + 1) / 2] shared errors: standard deviations >= 0, of a positive parameter
+                              relative to p in Q24, else as p; correlations in Q30. NULL: none */
 } pvid_trust_config_q31;
 
 /* Those of trust.h. */
@@ -65,7 +65,7 @@ const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self);
  *   above_noise:     of the assessment
  *   variance_ratio:  residual variance of the group over its expectation, Q24, >= 0
  *   freedom:         rows of the group less nuisances
- *   candidate:       the assessed estimate; what is published has the neglected terms
+ *   candidate:       the assessed estimate; what is published has the shared errors
  *
  * Returns and counts the reason of trust.h. */
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,

@@ -107,7 +107,8 @@ PVID_COLD bool pvid_standing_take(pvid_standing_judge *self, const pvid_standing
         take_fit(self, window);
     }
     causes |= (self->misfit || (window->judges && window->errs)) ? (uint32_t)PVID_DOUBT_MISFIT : 0u;
-    causes |= (window->solved && self->grew) ? (uint32_t)PVID_DOUBT_GREW : 0u;
+    /* not of the first few windows, whose scatter is not known */
+    causes |= (window->solved && self->grew && stands(self)) ? (uint32_t)PVID_DOUBT_GREW : 0u;
     if (window->solved && window->arrived && self->contradicts) {
         count_up(&self->contradicted);
     } else {

@@ -67,7 +67,7 @@ static const char *const statuses[] = {
     "bad drive ticks: rows_per_second of a q31 strong form: outside 1..2^30",
     "bad format: p_bits, n_bits or y_bits of a q31 estimator: outside -64..64",
     "bad renewal: of trust.h: not finite, or neither 0 nor 0.01..1e3",
-    "bad neglected: of trust.h: outside 0..1",
+    "bad shared: of trust.h: a standard deviation or correlation out of its range",
     "bad pointer: the object, the configuration or the bank is NULL",
     "bad layout: library and application were compiled with different sizes: layout.h; nothing was written",
     "bad excite parts: of an excitation: none or too many, an unknown kind, or steps without levels",

@@ -26,7 +26,7 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .groups_min = 3,
     .revert_after = 16,
     .renewal = 0.2f,
-    .neglected = 0.0f,
+    .shared = NULL,
 };
 
 /* p has arrived if its last step, relative, is at most this part of the largest relative standard error, or 1e-4. */
@@ -52,7 +52,7 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
 /* Limit of a group's variance ratio: a single group must not outweigh thousands. */
 #define VARIANCE_RATIO_MAX 1.0e6f
 
-/* Largest variance with neglected terms: a covariance of two such is finite. */
+/* Largest variance with shared errors: a covariance of two such is finite. */
 #define VARIANCE_MAX 1.0e36f
 
 PVID_COLD static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
@@ -63,10 +63,23 @@ PVID_COLD static pvid_status config_is_valid(const pvid_trust_config_f32 *config
         {1.0e-9f, 1.0e9f, PVID_BAD_SE_MAX, false},
         {1.0f, 1.0e6f, PVID_BAD_MISFIT_MAX, true},
         {0.01f, 1.0e3f, PVID_BAD_RENEWAL, true},
-        {0.0f, (PVID_NEGLECTED != 0) ? 1.0f : 0.0f, PVID_BAD_NEGLECTED, false},
     };
-    const float values[] = {config->kappa_min, config->se_max, config->misfit_max, config->renewal, config->neglected};
+    const float values[] = {config->kappa_min, config->se_max, config->misfit_max, config->renewal};
     return pvid_settings_within_f32(values, ranges, sizeof values / sizeof values[0]);
+}
+
+/* Shared errors of n_p parameters. */
+PVID_COLD static bool shared_are_valid(const float shared[], size_t n_p)
+{
+    bool valid = true;
+    size_t k = 0;
+    for (size_t a = 0; a < n_p; a++) {
+        for (size_t b = a; b < n_p; b++) {
+            valid = valid && pvid_within_f32(shared[k], (a == b) ? 0.0f : -1.0f, (a == b) ? 1.0e9f : 1.0f);
+            k++;
+        }
+    }
+    return valid;
 }
 
 PVID_COLD static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 *estimator)
@@ -96,6 +109,9 @@ PVID_COLD pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;
+    }
+    if ((config->shared != NULL) && ((PVID_SHARED == 0) || !shared_are_valid(config->shared, estimator->model->n_p))) {
+        return PVID_BAD_SHARED;
     }
     memset(self, 0, sizeof *self);
     self->config = *config;
@@ -273,24 +289,31 @@ PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason 
     return PVID_UPDATED;
 }
 
-/* Adds the errors from neglected terms, which all positive parameters have at once. */
-PVID_COLD static void add_neglected(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
-                                    pvid_estimate_f32 *candidate)
+/* Adds the shared errors, and to the covariance what they have in common. */
+PVID_COLD static void add_shared(const float shared[], const pvid_model_f32 *model, pvid_estimate_f32 *candidate)
 {
-    const size_t n_p = estimator->model->n_p;
+    const size_t n_p = model->n_p;
     float error[PVID_MAX_P];
+    size_t k = 0;
     for (size_t a = 0; a < n_p; a++) {
-        error[a] = pvid_is_positive_f32(estimator->model, a) ? (self->config.neglected * candidate->p[a]) : 0.0f;
+        error[a] = shared[k] * (pvid_is_positive_f32(model, a) ? candidate->p[a] : 1.0f);
         const float variance = (candidate->se[a] * candidate->se[a]) + (error[a] * error[a]);
         if (variance <= VARIANCE_MAX) {
             candidate->se[a] = sqrtf(variance);
         } else { /* NaN too: as without */
             error[a] = 0.0f;
         }
+        k += n_p - a;
     }
+    k = 0;
     for (size_t a = 0; a < n_p; a++) {
-        for (size_t b = 0; b < n_p; b++) {
-            candidate->covariance[a][b] += error[a] * error[b];
+        candidate->covariance[a][a] += error[a] * error[a];
+        k++;
+        for (size_t b = a + 1u; b < n_p; b++) {
+            const float common = (error[a] * error[b]) * shared[k];
+            candidate->covariance[a][b] += common;
+            candidate->covariance[b][a] += common;
+            k++;
         }
     }
 }
@@ -338,7 +361,7 @@ PVID_COLD void pvid_trust_compare_f32(pvid_trust_f32 *self, size_t n_p, const pv
     bool differs = false;
     bool grew = false;
     for (size_t a = 0; self->published && (a < n_p); a++) {
-        const float held = self->estimate.se[a];
+        const float held = self->own[a];
         const float joint = (candidate->se[a] * candidate->se[a]) + (held * held);
         const float way = candidate->p[a] - self->estimate.p[a];
         differs = differs || ((way * way) > (away * joint));
@@ -389,10 +412,12 @@ PVID_COLD pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimato
         pvid_count_up(&number);
         candidate->standing = self->standing.now;
         candidate->standing.age = 0;
-        if ((PVID_NEGLECTED != 0) && (self->config.neglected > 0.0f)) {
-            add_neglected(self, estimator, candidate);
+        memcpy(self->own, candidate->se, sizeof self->own);
+        if ((PVID_SHARED != 0) && (self->config.shared != NULL)) {
+            add_shared(self->config.shared, estimator->model, candidate);
         }
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
+        memcpy(candidate->se, self->own, sizeof self->own); /* as the second stage compares them */
         self->published = true;
     }
     return pvid_trust_report(&estimator->counters, verdict, reason, self->misfit);
@@ -411,7 +436,7 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
     return reported;
 }
 
-uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config)
+uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config, size_t n_p)
 {
     uint32_t running = pvid_fingerprint_float(hash, config->kappa_min);
     running = pvid_fingerprint_float(running, config->se_max);
@@ -419,5 +444,5 @@ uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *
     running = pvid_fnv_word(running, config->groups_min);
     running = pvid_fnv_word(running, config->revert_after);
     running = pvid_fingerprint_float(running, config->renewal);
-    return pvid_fingerprint_float(running, config->neglected);
+    return pvid_fingerprint_floats(running, config->shared, (config->shared != NULL) ? ((n_p * (n_p + 1u)) / 2u) : 0u);
 }

@@ -13,7 +13,7 @@ pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32
                                   float size, bool above_noise, float variance_ratio,
                                   const pvid_estimate_f32 *candidate);
 
-/* Publishes the candidate, with the neglected terms, if the verdict is PVID_UPDATED; counts the verdict. `reason` is
+/* Publishes the candidate, with the shared errors, if the verdict is PVID_UPDATED; counts the verdict. `reason` is
  * that of the solve. Returns the reason to report. */
 pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
                                    pvid_reason reason, pvid_estimate_f32 *candidate);
@@ -23,7 +23,7 @@ pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *est
 void pvid_trust_stand_f32(pvid_trust_f32 *self, pvid_reason verdict, pvid_reason reason, float variance_ratio,
                           uint16_t freedom, bool errs, const pvid_estimate_f32 *candidate);
 
-/* The hash of the conditions, continued from `hash`. */
-uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config);
+/* The hash of the conditions for n_p parameters, continued from `hash`. */
+uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config, size_t n_p);
 
 #endif

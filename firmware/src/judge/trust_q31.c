@@ -38,7 +38,7 @@ const pvid_trust_config_q31 pvid_trust_defaults_q31 = {
     .groups_min = 3,
     .revert_after = 16,
     .renewal = 13107, /* 20 % */
-    .neglected = 0,
+    .shared = NULL,
 };
 
 #define RENEWAL_MIN 655u /* 0.01, Q16 */
@@ -50,7 +50,9 @@ const pvid_trust_config_q31 pvid_trust_defaults_q31 = {
 /* Limit of a group's variance ratio: a single group must not outweigh thousands. */
 #define VARIANCE_RATIO_MAX ((int64_t)1000000 << PVID_VARIANCE_RATIO_BITS)
 
-#define ERROR_BITS 24 /* of se_max */
+#define COARSER 14u     /* bits that a variance ratio of the short mean is rounded to: 32 hold it */
+#define SHARED_BITS 24u /* of a relative shared error */
+#define ERROR_BITS 24   /* of se_max */
 
 static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
 {
@@ -66,10 +68,23 @@ static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
     if ((config->renewal != 0u) && ((config->renewal < RENEWAL_MIN) || (config->renewal > RENEWAL_MAX))) {
         return PVID_BAD_RENEWAL;
     }
-    if ((config->neglected < 0) || (config->neglected > PVID_ONE_Q30)) {
-        return PVID_BAD_NEGLECTED;
-    }
     return PVID_OK;
+}
+
+/* Shared errors of n_p parameters. */
+PVID_COLD static bool shared_are_valid(const int32_t shared[], size_t n_p)
+{
+    bool valid = true;
+    size_t k = 0;
+    for (size_t a = 0; a < n_p; a++) {
+        valid = valid && (shared[k] >= 0);
+        k++;
+        for (size_t b = a + 1u; b < n_p; b++) {
+            valid = valid && (pvid_magnitude_q31(shared[k]) <= (uint64_t)PVID_ONE_Q30);
+            k++;
+        }
+    }
+    return valid;
 }
 
 void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
@@ -90,6 +105,9 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
         return status;
+    }
+    if ((config->shared != NULL) && !shared_are_valid(config->shared, estimator->model->n_p)) {
+        return PVID_BAD_SHARED;
     }
     memset(self, 0, sizeof *self);
     self->config = *config;
@@ -123,15 +141,16 @@ static bool add_variance_ratio(pvid_trust_q31 *self, int64_t variance_ratio)
     }
     self->long_mean =
         pvid_clamp_q31(self->long_mean + ((x - self->long_mean) / (int64_t)self->judged), VARIANCE_RATIO_MAX);
-    self->recent[self->next] = x;
+    self->recent[self->next] = (int32_t)pvid_round_shift_q31(x, COARSER);
     self->next = (uint8_t)((self->next + 1u == PVID_TRUST_SHORT) ? 0u : (self->next + 1u));
     int64_t sum = 0;
     for (size_t i = 0; i < PVID_TRUST_SHORT; i++) {
         sum += self->recent[i];
     }
     const int64_t limit = (int64_t)self->config.misfit_max << (PVID_VARIANCE_RATIO_BITS - 16);
+    const int64_t coarse = (int64_t)(self->config.misfit_max >> (COARSER - (PVID_VARIANCE_RATIO_BITS - 16u)));
     const bool short_exceeds =
-        (self->judged >= PVID_TRUST_SHORT) && ((2 * sum) > (3 * (limit * (int64_t)PVID_TRUST_SHORT)));
+        (self->judged >= PVID_TRUST_SHORT) && ((2 * sum) > (3 * (coarse * (int64_t)PVID_TRUST_SHORT)));
     const bool long_exceeds = (self->judged >= PVID_TRUST_LONG) && (self->long_mean > limit);
     return short_exceeds || long_exceeds;
 }
@@ -280,30 +299,37 @@ PVID_COLD static int64_t part_of(int64_t x, int64_t y)
     return (y > 0) ? pvid_clamp_q31((x * PVID_ONE_Q30) / y, PVID_ONE_Q30) : PVID_ONE_Q30;
 }
 
-/* Adds the errors from neglected terms, which all positive parameters have at once. With e = neglected p and
- * se'^2 = se^2 + e^2, a correlation becomes (se_a se_b correlation + e_a e_b) / (se'_a se'_b). */
-PVID_COLD static void add_neglected(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
-                                    pvid_estimate_q31 *candidate)
+/* Adds the shared errors e. With se'^2 = se^2 + e^2, a correlation becomes
+ * (se_a se_b correlation + e_a e_b shared correlation) / (se'_a se'_b). */
+PVID_COLD static void add_shared(const int32_t shared[], const pvid_model_q31 *model, pvid_estimate_q31 *candidate)
 {
-    const size_t n_p = estimator->model->n_p;
+    const size_t n_p = model->n_p;
     int64_t own[PVID_MAX_P];  /* se / se', Q30 */
     int64_t more[PVID_MAX_P]; /* e / se', Q30 */
+    size_t k = 0;
     for (size_t a = 0; a < n_p; a++) {
-        const int64_t share = pvid_is_positive_q31(estimator->model, a) ? self->config.neglected : 0;
-        const int64_t error = pvid_clamp_q31(pvid_round_shift_q31(share * candidate->p[a], 30u), INT32_MAX);
+        int64_t error = (shared[k] > 0) ? shared[k] : 0;
+        if (pvid_is_positive_q31(model, a)) {
+            error = pvid_clamp_q31(pvid_round_shift_q31(error * candidate->p[a], SHARED_BITS), INT32_MAX);
+        }
         const int64_t before = candidate->se[a];
         const int64_t square = pvid_clamp_q31((before * before) + (error * error), (int64_t)1 << 62);
         const int64_t after = pvid_clamp_q31((int64_t)pvid_square_root_q31((uint64_t)square), INT32_MAX);
         own[a] = part_of(before, after);
         more[a] = (after > 0) ? part_of(error, after) : 0;
         candidate->se[a] = (int32_t)after;
+        k += n_p - a;
     }
+    k = 0;
     for (size_t a = 0; a < n_p; a++) {
+        k++;
         for (size_t b = a + 1u; b < n_p; b++) {
             const int64_t part = pvid_round_shift_q31(own[a] * own[b], 30u) * candidate->correlation[a][b];
-            const int64_t sum = pvid_round_shift_q31(part, 30u) + pvid_round_shift_q31(more[a] * more[b], 30u);
+            const int64_t common = pvid_round_shift_q31(more[a] * more[b], 30u) * shared[k];
+            const int64_t sum = pvid_round_shift_q31(part, 30u) + pvid_round_shift_q31(common, 30u);
             candidate->correlation[a][b] = (int32_t)pvid_clamp_q31(sum, PVID_ONE_Q30);
             candidate->correlation[b][a] = candidate->correlation[a][b];
+            k++;
         }
     }
 }
@@ -350,7 +376,7 @@ PVID_COLD static void compare(pvid_trust_q31 *self, size_t n_p, const pvid_estim
     bool grew = false;
     for (size_t a = 0; self->published && (a < n_p); a++) {
         const int64_t se = candidate->se[a];
-        const int64_t held = self->estimate.se[a];
+        const int64_t held = self->own[a];
         const int64_t way = (int64_t)pvid_magnitude_q31((int64_t)candidate->p[a] - self->estimate.p[a]);
         const int64_t part = way / PVID_STANDING_AWAY; /* below 2^30 */
         differs = differs || ((part * part) > ((se * se) + (held * held)));
@@ -404,8 +430,9 @@ pvid_reason pvid_trust_publish_q31(pvid_trust_q31 *self, pvid_estimator_q31 *est
         pvid_count_up(&number);
         candidate->standing = self->standing.now;
         candidate->standing.age = 0;
-        if (self->config.neglected > 0) {
-            add_neglected(self, estimator, candidate);
+        memcpy(self->own, candidate->se, sizeof self->own);
+        if (self->config.shared != NULL) {
+            add_shared(self->config.shared, estimator->model, candidate);
         }
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
@@ -424,7 +451,7 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
     return reported;
 }
 
-uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *config)
+uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *config, size_t n_p)
 {
     const int32_t limits[] = {config->kappa_min, config->se_max};
     uint32_t running = pvid_fingerprint_words(hash, limits, sizeof limits / sizeof limits[0]);
@@ -432,5 +459,5 @@ uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *
     running = pvid_fnv_word(running, config->groups_min);
     running = pvid_fnv_word(running, config->revert_after);
     running = pvid_fnv_word(running, config->renewal);
-    return pvid_fnv_word(running, (uint32_t)config->neglected);
+    return pvid_fingerprint_words(running, config->shared, (config->shared != NULL) ? ((n_p * (n_p + 1u)) / 2u) : 0u);
 }

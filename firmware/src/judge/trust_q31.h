@@ -13,6 +13,6 @@ void pvid_trust_stand_q31(pvid_trust_q31 *self, pvid_reason judged, pvid_reason 
                           uint16_t freedom, bool errs, const pvid_estimate_q31 *candidate);
 
 /* The hash of the conditions, continued from `hash`. */
-uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *config);
+uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *config, size_t n_p);
 
 #endif

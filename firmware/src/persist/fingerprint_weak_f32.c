@@ -151,6 +151,6 @@ uint32_t pvid_fingerprint_weak_f32(const pvid_weak_config_f32 *config)
     hash = pvid_fnv_word(hash, config->compensation ? 1u : 0u);
     hash = pvid_fnv_word(hash, config->iterations);
     hash = pvid_fingerprint_estimator_f32(hash, &config->estimator, model->model->n_p);
-    hash = pvid_fingerprint_trust_f32(hash, &config->trust);
+    hash = pvid_fingerprint_trust_f32(hash, &config->trust, model->model->n_p);
     return pvid_fingerprint_gate_f32(hash, &config->gate);
 }

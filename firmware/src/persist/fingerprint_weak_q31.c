@@ -206,6 +206,6 @@ uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)
     hash = pvid_fnv_word(hash, config->compensation ? 1u : 0u);
     hash = pvid_fnv_word(hash, config->iterations);
     hash = pvid_fingerprint_estimator_q31(hash, &config->estimator, model->model->n_theta, model->model->n_p);
-    hash = pvid_fingerprint_trust_q31(hash, &config->trust);
+    hash = pvid_fingerprint_trust_q31(hash, &config->trust, model->model->n_p);
     return pvid_fingerprint_gate_q31(hash, &config->gate);
 }

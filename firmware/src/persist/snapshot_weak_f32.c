@@ -69,6 +69,7 @@ static const pvid_snapshot_pointer pointers[] = {
     {PLACE(finish.work.solve.noise), PLACE(finish.candidate.covariance)},
     {PLACE(finish.work.solve.estimate), PLACE(finish.candidate)},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(trust.config.shared), PVID_SNAPSHOT_OF_INIT},
 };
 const pvid_snapshot_shape pvid_snapshot_weak_shape_f32 = {sizeof(pvid_weak_f32), pointers,
                                                           sizeof pointers / sizeof pointers[0]};

@@ -63,6 +63,7 @@ static const pvid_snapshot_pointer pointers[] = {
     {PLACE(accumulator.design), PVID_SNAPSHOT_OF_INIT},
     {PLACE(accumulator.front.offset), PVID_SNAPSHOT_OF_INIT},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(trust.config.shared), PVID_SNAPSHOT_OF_INIT},
 };
 static const pvid_snapshot_shape shape = {sizeof(pvid_weak_q31), pointers, sizeof pointers / sizeof pointers[0]};
 

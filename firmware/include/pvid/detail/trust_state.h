@@ -24,6 +24,7 @@ struct pvid_trust_f32 {
     float long_mean;                /* of the variance ratios (residual variance over its expectation) of the groups */
     float recent[PVID_TRUST_SHORT]; /* variance ratios of the last groups */
     float trusted[PVID_MAX_P];      /* p behind several valid publications in a row; the start before */
+    float own[PVID_MAX_P];          /* standard errors of the published estimate without the shared ones */
     pvid_standing_judge standing;
     pvid_publication_mark mark;
     pvid_estimate_f32 estimate; /* the published one, for the context that calls step */

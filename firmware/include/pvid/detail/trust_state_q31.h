@@ -20,10 +20,11 @@ struct pvid_trust_q31 {
     bool converged;         /* p has once settled with small standard errors */
     bool published;         /* an estimate has been published */
     bool misfit;
-    int32_t anchor[PVID_MAX_P]; /* p at which the rows in the sums last agreed with p, or at the last renewal */
-    int64_t long_mean;          /* of the variance ratios of the groups, PVID_VARIANCE_RATIO_BITS */
-    int64_t recent[PVID_TRUST_SHORT];
-    int32_t trusted[PVID_MAX_P]; /* p behind several valid publications in a row; the start before */
+    int32_t anchor[PVID_MAX_P];       /* p at which the rows in the sums last agreed with p, or at the last renewal */
+    int64_t long_mean;                /* of the variance ratios of the groups, PVID_VARIANCE_RATIO_BITS */
+    int32_t recent[PVID_TRUST_SHORT]; /* those of the last groups, rounded to 2^-10 */
+    int32_t trusted[PVID_MAX_P];      /* p behind several valid publications in a row; the start before */
+    int32_t own[PVID_MAX_P];          /* standard errors of the published estimate without the shared ones */
     pvid_standing_judge standing;
     pvid_publication_mark mark;
     pvid_estimate_q31 estimate; /* the published one, for the context that calls step */

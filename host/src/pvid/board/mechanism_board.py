@@ -24,14 +24,13 @@ from pvid.codegen.weak_library import weak_native, weak_sources
 from pvid.codegen.weak_sizes import sizes_of_design
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.refine import full_motion_of, refine_design
+from pvid.configuration.shared import Shared
 from pvid.configuration.weak import (
     config_for_recording,
     config_for_simulated_rig,
     config_to_identify,
-    neglected_part,
     samples_of,
     weak_config,
-    with_neglected,
 )
 from pvid.core.native import Native
 from pvid.core.weak_native import RefinedIdentifier, WeakIdentifier
@@ -148,8 +147,7 @@ class MechanismBoard(FloatBoard):
         """
         made = nominal_run(rig)
         run = made.recording.signals
-        config = weak_config(made.compiled, run, made.chosen.design, made.p)
-        config = with_neglected(config, neglected_part(made.compiled, run))
+        config = weak_config(made.compiled, run, made.chosen.design, made.p, shared=True)
         # What the rig really reads is not known: a height from the floor is no fault.
         config = replace(config, range=None)
         refine = refine_design(made.compiled, config, run, made.p) if refined else None
@@ -331,7 +329,7 @@ def _flat(config: WeakConfig, refine: RefineConfig | None) -> dict[str, Any]:
         "gate": config.gate,
         "design": config.design,
     }
-    found = {one.name: getattr(config, one.name) for one in fields(config) if one.name not in parts}
+    found = {one.name: getattr(config, one.name) for one in fields(config) if one.name not in (*parts, "causes")}
     if refine is not None:
         parts["refine"] = refine
     for part, owner in parts.items():
@@ -371,12 +369,14 @@ def _config(compiled: CompiledModel, settings: Mapping[str, Any]) -> WeakConfig:
     made = WeakDesign32(
         model=weak_model_of(compiled), filter=filters, compensator=compensators, noise=noise, **arrays(design)
     )
-    estimator = arrays(part("estimator"))
+    estimator, trust = arrays(part("estimator")), arrays(part("trust"))
+    if "neglected" in trust:
+        trust["shared"] = Shared.of_part(compiled, trust.pop("neglected")).triangle
     own = {one.name: settings[one.name] for one in fields(WeakConfig) if one.name in settings}
     return WeakConfig(
         **arrays(own),
         design=made,
         estimator=EstimatorConfig(**{**estimator, "law": Law(estimator["law"])}),
-        trust=TrustConfig(**part("trust")),
+        trust=TrustConfig(**trust),
         gate=GateConfig(**part("gate")),
     )

@@ -17,14 +17,13 @@ from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31
 from pvid.codegen.weak_q31 import JetReaches, WeakQ31, fixed_weak
 from pvid.configuration.nominal_run import nominal_run
-from pvid.configuration.weak import neglected_part
+from pvid.configuration.shared import Shared
 from pvid.configuration.weak_q31 import (
     weak_q31_for_recording,
     weak_q31_for_run,
     weak_q31_for_simulated_rig,
     weak_q31_of_parts,
     weak_q31_to_identify,
-    with_neglected,
 )
 from pvid.core.native import Native
 from pvid.core.weak_native_q31 import WeakIdentifierQ31
@@ -93,8 +92,7 @@ class MechanismBoardQ31:
         """As MechanismBoard.of_guess."""
         made = nominal_run(rig)
         run = made.recording.signals
-        weak = weak_q31_for_run(made.compiled, run, made.chosen.design, made.p)
-        weak = with_neglected(weak, neglected_part(made.compiled, run))
+        weak = weak_q31_for_run(made.compiled, run, made.chosen.design, made.p, shared=True)
         return cls(rig, weak, weak.counts_of(run)[:MOST_TICKS])
 
     def __post_init__(self) -> None:
@@ -245,10 +243,12 @@ class MechanismBoardQ31:
         highest = design["functions"] // 2 + design["power"] // 2
         circle = circle_of(design["hop"], highest, design["fine"])
         tables = WeakDesignQ31(model=made.model, circle=circle, units=(), margins={}, **design)
+        trust = part("trust")
+        part_of_all = trust.pop("neglected", 0) / 2**30  # of logs before there were other shared errors
         config = WeakConfigQ31(
             design=tables,
             estimator=EstimatorConfigQ31(**part("estimator")),
-            trust=TrustConfigQ31(**part("trust")),
+            trust=TrustConfigQ31(**trust),
             gate=GateConfigQ31(**part("gate")),
             **{
                 one.name: _tuples(weak[one.name])
@@ -257,6 +257,10 @@ class MechanismBoardQ31:
             },
         )
         own = weak_q31_of_parts(compiled, made, config, float(weak["sample_rate"]))
+        if part_of_all:
+            shared = Shared.of_part(compiled, part_of_all).counts(own.parameters.p_bits)
+            config = replace(config, trust=replace(config.trust, shared=shared))
+            own = replace(own, config=config)
         return cls(rig, own, np.zeros((0, tables.model.samples), np.int32))
 
 
@@ -297,7 +301,7 @@ def _flat(weak: WeakQ31) -> dict[str, Any]:
         "run_s": weak.made.run_s,
         "jet_reach": weak.made.reaches,
     }
-    found |= {one.name: getattr(config, one.name) for one in fields(config) if one.name not in parts}
+    found |= {one.name: getattr(config, one.name) for one in fields(config) if one.name not in (*parts, "causes")}
     for part, owner in parts.items():
         names = (one.name for one in fields(owner) if part != "design" or one.name not in _COMPUTED)
         found |= {f"{part}_{name}": getattr(owner, name) for name in names}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import click
 from pvid.base.console import DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, force_option
-from pvid.cli.rig_design import model_of_rig, recorded
+from pvid.cli.rig_design import analysis_of, model_of_rig, recorded
 from pvid.settings.cores import CORES, FIXED, FLOAT
 
 if TYPE_CHECKING:
@@ -107,12 +108,17 @@ def _deployment(
             recording = recorded(compiled, rig, run_path, columns)
         assert recording is not None
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
+        answer = None if run_path is None else analysis_of(compiled, recording)
+        found = None if answer is None else answer.found
+        warnings = () if answer is None else tuple(one.text for one in answer.doubts if one.alarm)
         if is_integer:
-            return deployment_q31(weak_q31_for_recording(compiled, recording, functions), recording.signals, title)
+            weak = weak_q31_for_recording(compiled, recording, functions, found=found)
+            return replace(deployment_q31(weak, recording.signals, title), warnings=warnings)
         signs: Reversals = "averaged" if run_path is not None else "decided"
-        config = config_for_recording(compiled, recording, functions, reversals=signs)
+        config = config_for_recording(compiled, recording, functions, reversals=signs, found=found)
         refine = _noted(lambda: refine_design(compiled, config, recording.signals))
-        return deployment_f32(compiled, config, recording.signals, title, refine, excitation)
+        made = deployment_f32(compiled, config, recording.signals, title, refine, excitation)
+        return replace(made, warnings=warnings)
     if model not in names_of_shipped():
         raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
     run = simulated_run_of(compiled)[0]

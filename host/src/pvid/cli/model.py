@@ -14,13 +14,14 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, force_option
-from pvid.cli.rig_design import model_of_rig, recorded
+from pvid.cli.rig_design import analysis_of, model_of_rig, recorded
 from pvid.cli.simulate import ABOVE_0, numbers, of_model, start_option
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.codegen.strong_q31 import StrongQ31
     from pvid.codegen.weak_q31 import WeakQ31
     from pvid.model.compiled import CompiledModel
+    from pvid.oracle.weak.identify import Identified
     from pvid.rig.run import Recording
     from pvid.settings.refine import RefineConfig
     from pvid.settings.strong import StrongModelConfig
@@ -196,9 +197,11 @@ def build(
     if columns is not None and run_path is None:
         raise PvidError("--columns needs --run")
     recording = None if run_path is None else recorded(compiled, rig, run_path, columns)
+    found: Identified | None = None
     if recording is not None:
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
-    design = _design_of(compiled, model, recording, functions)
+        found = analysis_of(compiled, recording).found
+    design = _design_of(compiled, model, recording, functions, found)
     limits = Reaches(bandwidth, window, of=numbers(reaches, "--reach"))
     soft = numbers(soft_signs, "--soft-sign")
     given = [*(["--strong"] if strong else []), *(f"--soft-sign {one}" for one in soft_signs)]
@@ -214,7 +217,7 @@ def build(
     whole = GeneratedModel(compiled, title, options)
     no_fixed_weak = no_fixed_strong = None
     if design is not None:
-        weak, no_fixed_weak = _weak_q31(compiled, recording, functions, soft)
+        weak, no_fixed_weak = _weak_q31(compiled, recording, functions, soft, found)
         options = replace(options, design=design, weak_q31_for_run=weak)
     if strong:
         strong_design, strong_q31, no_fixed_strong = _strong_design_of(compiled, model, recording)
@@ -296,6 +299,7 @@ def _design_of(
     model: str,
     recording: Recording | None,
     functions: int | None,
+    found: Identified | None,
 ) -> WeakConfig | None:
     from pvid.codegen.generated import GeneratedModel
     from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped
@@ -304,7 +308,7 @@ def _design_of(
     if GeneratedModel(compiled, "").weak.made is None:
         return None
     if recording is not None:
-        return config_for_recording(compiled, recording, functions)
+        return config_for_recording(compiled, recording, functions, found=found)
     if model in names_of_shipped():
         return config_for_rig_like_the_shipped(compiled, functions)
     if functions is not None:
@@ -313,7 +317,11 @@ def _design_of(
 
 
 def _weak_q31(
-    compiled: CompiledModel, recording: Recording | None, functions: int | None, soft_signs: dict[str, float]
+    compiled: CompiledModel,
+    recording: Recording | None,
+    functions: int | None,
+    soft_signs: dict[str, float],
+    found: Identified | None,
 ) -> tuple[WeakQ31 | None, str | None]:
     """The fixed-point weak form for the rig, or why there is none."""
     from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_rig_like_the_shipped
@@ -321,6 +329,6 @@ def _weak_q31(
     try:
         if recording is None:
             return weak_q31_for_rig_like_the_shipped(compiled, functions, soft_signs), None
-        return weak_q31_for_recording(compiled, recording, functions, soft_signs), None
+        return weak_q31_for_recording(compiled, recording, functions, soft_signs, found=found), None
     except PvidError as error:
         return None, str(error)

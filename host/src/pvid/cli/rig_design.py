@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
+    from pvid.identification.answer import Analysis
     from pvid.model.compiled import CompiledModel
     from pvid.rig.mechanism_file import MechanismRig
     from pvid.rig.run import Recording
@@ -22,6 +23,19 @@ def model_of_rig(model: str, rig_path: Path | None, run_path: Path | None) -> tu
         return compiled, None
     rig = rig_of(run_path, rig_path, (), model)
     return rig.applied(compiled), rig
+
+
+def analysis_of(compiled: CompiledModel, recording: Recording) -> Analysis:
+    """That which `identify` prints of a recording, with its warnings on standard error."""
+    from pvid.base.console import working, write_stderr
+    from pvid.identification.road import identified
+
+    with working("identifying"):
+        answer = identified(recording, compiled, refine=False)
+    for one in answer.doubts:
+        if one.alarm:
+            write_stderr(f"pvid: warning: {one.text}")
+    return answer
 
 
 def recorded(compiled: CompiledModel, rig: MechanismRig | None, run_path: Path, columns: str | None) -> Recording:

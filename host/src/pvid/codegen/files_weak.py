@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
@@ -255,6 +255,7 @@ def design_header(config: WeakConfig, compiled: CompiledModel, command: str) -> 
                 for one, start, low, high in zip(compiled.unknowns, own.start, own.lower, own.upper, strict=True)
             ]
         ),
+        *shared_errors(config.causes),
     ]
     body = [
         "#include <stddef.h>",
@@ -271,6 +272,15 @@ def design_header(config: WeakConfig, compiled: CompiledModel, command: str) -> 
         _config(config),
     ]
     return guarded(f"{name}_design_f32", about, body)
+
+
+def shared_errors(causes: Sequence[str]) -> list[str]:
+    """Lines on them, for a banner."""
+    return (
+        ["", "Of each published standard error, shared by all windows (trust.h):", *(f"  {one}" for one in causes)]
+        if causes
+        else []
+    )
 
 
 def _floats(name: str, values: Float32, comment: str) -> str:
@@ -336,12 +346,16 @@ def _design_struct(design: WeakDesign32) -> str:
 
 def _checks(config: WeakConfig) -> list[str]:
     name = config.design.model.name
-    given = {"range": config.range, "drive_min": config.drive_min}
+    given = {
+        "range": (config.range, "of each sample"),
+        "drive_min": (config.drive_min, "of each sample"),
+        "shared": (config.trust.shared, "errors that all windows share: trust.h"),
+    }
     return [
         one
-        for field, values in given.items()
+        for field, (values, comment) in given.items()
         if values is not None
-        for one in (_floats(f"{name}_{field}", values, "of each sample"), "")
+        for one in (_floats(f"{name}_{field}", values, comment), "")
     ]
 
 
@@ -355,7 +369,9 @@ def _config(config: WeakConfig) -> str:
         "compensation": str(config.compensation).lower(),
         "iterations": config.iterations,
         "estimator": inner(fields_in_c(config.estimator)),
-        "trust": inner(fields_in_c(config.trust)),
+        "trust": inner(
+            fields_in_c(config.trust) | {"shared": "NULL" if config.trust.shared is None else f"{name}_shared"}
+        ),
         "gate": inner(fields_in_c(config.gate)),
     }
     return initialised(f"static const pvid_weak_config_f32 {name}_config_f32", values)

@@ -28,7 +28,7 @@ def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]
         "PVID_MAX_WINDOWS": 0 if shares_place(config) else 1,
         "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
         "PVID_FEEDBACK": int(config.estimator.law is not Law.STATIONARY or config.estimator.feedback_hz > 0),
-        "PVID_NEGLECTED": int(config.trust.neglected > 0),
+        "PVID_SHARED": int(config.trust.shared is not None),
         "PVID_REFINEMENT": int(refined),
     }
     if found != needed:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.weak import weak_model_of
+from pvid.configuration.shared import Run as Run
+from pvid.configuration.shared import Shared
 from pvid.configuration.weak_tables import LONGEST_HOP, config_of, design_tables, for_core
 from pvid.model.compiled import CompiledModel
 from pvid.models.simulated_rig import simulated_rig
@@ -17,14 +19,13 @@ from pvid.oracle.weak.choice import MODEL_ERROR, Scored, ranked, ranked_for_core
 from pvid.oracle.weak.design import Reversals, WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
-from pvid.oracle.weak.identify import neglected, ready
+from pvid.oracle.weak.identify import Identified, ready
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.weak.solve import Fit
 from pvid.rig.run import Recording
 from pvid.settings.weak import WeakConfig, WeakDesign32
 from pvid.sim.simulated_run import RigSimulation
-
-Run = Mapping[str, npt.ArrayLike]
 
 # A design that costs less is taken if its score is at most this many times the best one's.
 _COST = 1.2
@@ -38,7 +39,14 @@ _SHORT = 15  # taps, for which the lower degree is
 
 
 def weak_config(
-    compiled: CompiledModel, run: Run, design: WeakDesign, p: Float | None = None, *, start_there: bool = False
+    compiled: CompiledModel,
+    run: Run,
+    design: WeakDesign,
+    p: Float | None = None,
+    *,
+    start_there: bool = False,
+    shared: bool = False,
+    found: Identified | None = None,
 ) -> WeakConfig:
     """Settings of the identifier for a rig, from a run of it.
 
@@ -48,6 +56,8 @@ def weak_config(
     design : of the oracle; the identifier gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
     start_there : the identifier starts at the parameters of this run; False: at the guesses
+    shared : its standard errors contain those that all windows share; False: the run is all that is judged
+    found : the analysis of this run, whose shared errors they are; None: those of the design
 
     Raises
     ------
@@ -55,9 +65,14 @@ def weak_config(
         Where the identifier does not have what the model or the design needs.
     """
     made = weak_tables(compiled, run, design, p)
-    return config_of(
+    config = config_of(
         made.tables, design.sample_rate, made.rows.compiled.parameters, made.p if start_there else None, run
     )
+    if not shared:
+        return config
+    errors = made.shared(run, found)
+    trust = replace(config.trust, shared=errors.triangle)
+    return replace(config, trust=trust, causes=errors.lines(compiled.unknowns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +82,29 @@ class WeakTables:
     Attributes
     ----------
     rows : of the run, in float64
-    p : fitted to it [n_p]
-    errors : of the equations themselves, of each kind
+    fit : to it
     tables : of the float32 identifier
     """
 
     rows: WeakRows
-    p: Float
-    errors: list[EquationError]
+    fit: Fit
     tables: WeakDesign32
+
+    @property
+    def p(self) -> Float:
+        """Fitted [n_p]."""
+        return self.fit.p
+
+    @property
+    def errors(self) -> list[EquationError]:
+        """Of the equations themselves, of each kind."""
+        return list(self.fit.errors)
+
+    def shared(self, run: Run, found: Identified | None = None) -> Shared:
+        """Errors that all windows share; found: as of weak_config."""
+        if found is not None:
+            return Shared.of_answer(run, found, self.fit)
+        return Shared.of_design(run, self.rows.record.grid.design, self.fit)
 
 
 def weak_tables(compiled: CompiledModel, run: Run, design: WeakDesign, p: Float | None = None) -> WeakTables:
@@ -83,7 +112,7 @@ def weak_tables(compiled: CompiledModel, run: Run, design: WeakDesign, p: Float 
     tables_of = weak_model_of(compiled)
     rows = WeakRows.of(ready(compiled), run, for_core(design))
     fit = gated(rows, p)
-    return WeakTables(rows, fit.p, list(fit.errors), design_tables(tables_of, rows, fit.p, fit.errors))
+    return WeakTables(rows, fit, design_tables(tables_of, rows, fit.p, fit.errors))
 
 
 def config_for_recording(
@@ -92,30 +121,20 @@ def config_for_recording(
     functions: int | None = None,
     ranking: Sequence[Scored] = (),
     reversals: Reversals = "averaged",
+    found: Identified | None = None,
 ) -> WeakConfig:
     """Settings for the rig that made a recording; the estimate starts at what the recording shows.
-
-    The standard errors that a microcontroller publishes contain what linearised equations neglect at the largest motion
-    of the recording.
 
     Parameters
     ----------
     functions : K; None: chosen
     ranking, reversals : as of design_for_recording
+    found : the analysis of the recording, whose errors of scale and of the model a microcontroller publishes as well;
+        None: it publishes those of the design
     """
+    ranking = ranking or (() if found is None else found.ranking)
     design, p, known = design_and_p(compiled, recording, functions, ranking, reversals)
-    config = weak_config(compiled, recording.signals, design, p, start_there=known)
-    return with_neglected(config, neglected_part(compiled, recording.signals))
-
-
-def with_neglected(config: WeakConfig, part: float) -> WeakConfig:
-    """Settings whose published standard errors contain this part of each positive parameter."""
-    return replace(config, trust=replace(config.trust, neglected=part))
-
-
-def neglected_part(compiled: CompiledModel, run: Run) -> float:
-    """Relative error of p because equations are linearised, from the largest motion of a run, at most 1."""
-    return min(neglected(compiled, run), 1.0)
+    return weak_config(compiled, recording.signals, design, p, start_there=known, shared=True, found=found)
 
 
 def design_and_p(
@@ -132,10 +151,11 @@ def design_and_p(
 
 def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> WeakConfig:
     """The same, to identify the recording itself: the limit of a standard error is that of the analysis, whose verdict
-    judges the answer and whose standard errors contain what the equations neglect, not that of a microcontroller on its
+    judges the answer and whose standard errors contain the shared ones, not that of a microcontroller on its
     own."""
-    config = config_for_recording(compiled, recording, ranking=ranking)
-    return replace(config, trust=replace(config.trust, se_max=UNKNOWN, neglected=0.0))
+    design, p, known = design_and_p(compiled, recording, ranking=ranking)
+    config = weak_config(compiled, recording.signals, design, p, start_there=known)
+    return replace(config, trust=replace(config.trust, se_max=UNKNOWN))
 
 
 def design_for_recording(
@@ -198,8 +218,8 @@ def _with_fewer_functions(design: WeakDesign) -> Iterator[WeakDesign]:
 
 
 def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = None) -> WeakConfig:
-    """Settings for the shipped rig of a mechanism, with its own design, and for its simulation, whose equations are
-    those of the model: nothing is neglected.
+    """Settings for the shipped rig of a mechanism, with its own design, and for its simulation, which is exact: there
+    are no shared errors.
 
     Raises
     ------
@@ -211,9 +231,9 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
 
 
 def config_for_rig_like_the_shipped(compiled: CompiledModel, functions: int | None = None) -> WeakConfig:
-    """The same for a real rig that moves as much: its standard errors contain what linearised equations neglect."""
-    part = neglected_part(compiled, simulated_run_of(compiled, functions)[0])
-    return with_neglected(config_for_simulated_rig(compiled, functions), part)
+    """The same for a real rig that moves as much, with the shared errors of its signals, constants and equations."""
+    run, design, p = simulated_run_of(compiled, functions)
+    return weak_config(compiled, run, design, p, shared=True)
 
 
 def simulated_run_of(compiled: CompiledModel, functions: int | None = None) -> tuple[Run, WeakDesign, Float]:

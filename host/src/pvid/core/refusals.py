@@ -37,7 +37,6 @@ _RANGES: Mapping[Status, tuple[tuple[str, float, float], ...]] = {
     Status.BAD_DEAD_ZONE: (("dead_zone", 0, 100),),
     Status.BAD_SE_MAX: (("se_max", 1e-9, 1e9),),
     Status.BAD_MISFIT_MAX: (("misfit_max", 0, _LARGE), ("chi_max", 1, 1e6), ("clash_max", 1, 1e6)),
-    Status.BAD_NEGLECTED: (("neglected", 0, 1),),
     Status.BAD_GATE_SIGMAS: (("sigmas", 0, 1e3), ("outlier_gate", 0, 1e3), ("gate", 0, 1e3)),
     Status.BAD_GATE_PATIENCE: (("patience_s", 0, 1e12),),
     Status.BAD_RANGE: (("range", 1e-9, 1e9),),

@@ -87,6 +87,8 @@ class Deployment:
     first_s : of motion up to the first window that is judged [s]
     second : the refinement; None: the package has none
     excitation : of the commissioning; None: the package has none
+    causes : of the shared errors, as of WeakConfig
+    warnings : of the analysis of the recording that it is made for
     """
 
     name: str
@@ -102,6 +104,8 @@ class Deployment:
     playback: Playback = field(repr=False)
     second: SecondStage | None = None
     excitation: Excitation | None = None
+    causes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def core(self) -> str:

@@ -95,6 +95,7 @@ def deployment_f32(
         playback=playback,
         second=second,
         excitation=excitation,
+        causes=config.causes,
     )
 
 
@@ -127,6 +128,7 @@ def deployment_q31(weak: WeakQ31, run: Run, command: str) -> Deployment:
         command=command,
         first_s=weak.ticks_needed / weak.sample_rate,
         playback=_playback(counts, list(weak.lsb), record, design.hop * design.decimation, scale),
+        causes=weak.config.causes,
     )
 
 

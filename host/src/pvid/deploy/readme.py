@@ -52,6 +52,7 @@ def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequ
                 f"there is no estimate yet; `{d.name}_gap()` is for missing samples.",
                 f"Delete `{d.name}_example.c` and `.h` then.",
                 *_refined(d),
+                *_errors(d),
                 "",
                 *_kept(d),
                 "",
@@ -83,6 +84,18 @@ def _kept(d: Deployment) -> list[str]:
         f"the next life `{d.name}_load(record)` behind `{d.name}_begin()` makes them the start, whatever its release",
         "and settings; a record that is damaged or of other parameters is refused with a reason.",
     ]
+
+
+def _errors(d: Deployment) -> list[str]:
+    """What the standard errors contain, and the doubts about the recording."""
+    out = []
+    if d.causes:
+        whose = " of the first stage; those of the second contain noise alone" if d.second is not None else ""
+        out += ["", f"A longer run does not reduce these parts of the standard errors{whose}:", ""]
+        out += [f"- {one}" for one in d.causes]
+    if d.warnings:
+        out += ["", "The analysis of the recording says:", "", *(f"- {one}" for one in d.warnings)]
+    return out
 
 
 def _named(names: list[str]) -> str:

@@ -19,7 +19,8 @@ from pvid.oracle.weak.choice import Scored, score_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.identify import neglected, ready
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.shared import neglected
 from pvid.rig.clock import CLOCKS, USUAL_RATES
 from pvid.rig.columns import Columns
 from pvid.rig.mechanism_file import channels_of

@@ -43,6 +43,9 @@ class Signal:
     smooth : what a held input is set to never jumps: the refinement in C may take steps of several samples
     driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
     gain_sd : relative standard deviation of its gain; part of the standard errors, because a run seldom shows it
+    delay_sd, offset_sd
+        standard deviations of its delay [s] and offset [unit] in a design that no recording is for; None: a tenth of
+        the time between samples; half a sensor's resolution, a thousandth of an input's reach
     neglected
         the equations are linearised: their relative error is up to this many times the square of the signal, from its
         mean; part of the standard errors [1/unit^2]
@@ -59,6 +62,8 @@ class Signal:
     hold: Literal["zoh", "sampled"] = "sampled"
     driven: bool = False
     gain_sd: float = 0.0
+    delay_sd: float | None = None
+    offset_sd: float | None = None
     neglected: float = 0.0
     smooth: bool = False
     edge: Edge = "between"

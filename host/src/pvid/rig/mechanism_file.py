@@ -63,8 +63,8 @@ _KEYS = (
     "refine",
     "excitation",
 )
-_OF_AN_INPUT = ("gain_sd", "reach")
-OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected", "delay", "reach")
+_OF_AN_INPUT = ("gain_sd", "delay_sd", "offset_sd", "reach")
+OF_A_SENSOR = ("resolution", "noise", "gain_sd", "delay_sd", "offset_sd", "neglected", "delay", "reach")
 _POSITIVE = ("reach", "sample_rate")
 OF_THE_IDENTIFIER = ("forgetting_s", "outlier_gate", "outlier_patience_s", "dead_zone")  # fields of Following
 
@@ -80,8 +80,8 @@ class MechanismRig:
         (pvid.models.registry)
     sample_rate : [Hz]; None: that of the run
     known, known_sd : values of the model's constants, and standard deviations of them
-    sensor : by signal: resolution, reach [its unit], noise [resolutions], gain_sd [relative], delay [s], neglected (see
-        Signal); of an input gain_sd and reach alone
+    sensor : by signal: resolution, reach, offset_sd [its unit], noise [resolutions], gain_sd [relative], delay and
+        delay_sd [s], neglected (see Signal); of an input gain_sd, delay_sd, offset_sd and reach alone
     nominal : guesses of unknowns, or of outputs, from which those of unknowns follow
     identifier : what differs from Following's defaults
     refine : options of the refinement in C that are chosen or not

@@ -81,7 +81,7 @@ class Status(_Named):
     BAD_DRIVE_TICKS = 38
     BAD_FORMAT = 39
     BAD_RENEWAL = 40
-    BAD_NEGLECTED = 41
+    BAD_SHARED = 41
     BAD_POINTER = 42
     BAD_LAYOUT = 43
     BAD_EXCITE_PARTS = 44

@@ -43,7 +43,7 @@ class TrustConfig:
     groups_min: int = 3
     revert_after: int = 16
     renewal: float = 0.2
-    neglected: float = 0.0
+    shared: npt.NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class TrustConfigQ31:
     groups_min: int = 3
     revert_after: int = 16
     renewal: int = 13107
-    neglected: int = 0
+    shared: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True)

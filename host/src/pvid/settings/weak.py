@@ -310,6 +310,7 @@ class WeakConfig:
     drive_min : window dropped if the standard deviation of a sample is below [samples]; None: no check
     compensation : B gets what the sensors' noise takes from it
     iterations : Gauss-Newton steps in each of the first eight windows; then one
+    causes : what the shared errors of trust.h are made of, a line for each parameter; in no struct of C
     """
 
     sample_rate: float
@@ -321,6 +322,7 @@ class WeakConfig:
     iterations: int = 2
     trust: TrustConfig = field(default_factory=TrustConfig)
     gate: GateConfig = field(default_factory=GateConfig)
+    causes: tuple[str, ...] = ()
 
     form: ClassVar[str] = "weak"
     core: ClassVar[Core] = "f32"

@@ -184,6 +184,7 @@ class WeakConfigQ31:
     drive_min : window dropped if the standard deviation of a sample is below [counts]; None: no check
     compensation : b gets what the sensors' noise takes from it
     iterations : Gauss-Newton steps in each of the first eight windows; then one
+    causes : as of WeakConfig
     """
 
     design: WeakDesignQ31
@@ -194,3 +195,4 @@ class WeakConfigQ31:
     iterations: int = 2
     trust: TrustConfigQ31 = TrustConfigQ31()
     gate: GateConfigQ31 = GateConfigQ31()
+    causes: tuple[str, ...] = ()

@@ -58,10 +58,17 @@ class RigSimulation:
         missing = [name for name in model.p_names if name not in rig.truth]
         if missing:
             raise PvidError(f"the simulated rig of {model.name} gives no value of {', '.join(missing)}")
-        # A simulation is exact: it has no error of a gain or a clock, and its equations are those of the model.
+        # A simulation is exact: no gain, delay, offset or clock of it has an error, and its equations are those of
+        # the model.
         linearised = () if whole else tuple(one.name for one in model.signals if one.neglected)
         exact = tuple(
-            replace(one, gain_sd=0.0, neglected=0.0 if one.name in linearised else one.neglected)
+            replace(
+                one,
+                gain_sd=0.0,
+                delay_sd=0.0,
+                offset_sd=0.0,
+                neglected=0.0 if one.name in linearised else one.neglected,
+            )
             for one in model.signals
         )
         knowns = tuple(replace(one, sd=0.0) for one in model.knowns)

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.recent import Recent
-from pvid.model.compiled import CompiledModel, Known
-from pvid.oracle.weak import verdict, work
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak import shared, verdict, work
 from pvid.oracle.weak.assessment import Assessed, assessed, estimated_near_zero
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import shift_of
@@ -27,12 +26,13 @@ from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.missing import MOST, Explained, Missing, explained
 from pvid.oracle.weak.naming import of_missing, of_unexplained
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows, record_of
+from pvid.oracle.weak.rows import ready as ready
 from pvid.oracle.weak.samples import explains, of_samples
 from pvid.oracle.weak.scale import of_scale
-from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
+from pvid.oracle.weak.shared import or_nan
+from pvid.oracle.weak.solve import DivergedError, Fit, batch, online
 from pvid.oracle.weak.verdict import Attempts, Halves, Judged, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
-from pvid.oracle.weak.zero import on_their_own_scale
 
 
 @dataclass(frozen=True)
@@ -117,15 +117,11 @@ class Identified:
 
 
 _SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
-_STEPS_OF_KNOWN = 10
 
 _NOT_REWEIGHTED = (
     "The rows, weighted anew by their own residuals, lead from estimate to estimate without an end: the values are "
     "those of the sensors' weights alone (--weights sensors)."
 )
-
-ready = Recent(Compiled)  # a model with its functions
-
 
 # Of the work that is allowed to the search for a design: that of the rest where it finds a plausible estimate, terms
 # that are missing included, where it finds none, and where the equations explain nothing of a row.
@@ -228,15 +224,12 @@ def _judged(
     library = Library(run, used, fit)
     blurred = attempt("rates that the filter blurs", lambda: shift_of(fit, run, used))
     by_gain = {
-        one.name: _or_nan(fit, partial(library.by_gain, one.name))
+        one.name: or_nan(fit, partial(library.by_gain, one.name))
         for one in compiled.signals
         if one.gain_sd > 0 or one.unit != "rad"
     }
-    by_clock = _or_nan(fit, library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
-    by_neglect = model.parameters.positive * fit.p * neglected(compiled, run)
-    gains = [one.sd * _or_nan(fit, partial(of_known, compiled, run, fit, one)) for one in compiled.knowns if one.sd > 0]
-    gains += [one.gain_sd * by_gain[one.name] for one in compiled.signals if one.gain_sd > 0]
-    gains += [*([compiled.clock_sd * by_clock] if compiled.clock_sd else []), by_neglect]
+    by_clock = or_nan(fit, library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
+    gains = [one.moves for one in shared.of_scale(library)]
     parts = [
         verdict.widened(found.se, halves),
         *gains,
@@ -296,7 +289,7 @@ def _judged(
         allowance=units,
         by_gain=by_gain,
         by_clock=by_clock,
-        by_neglect=by_neglect,
+        by_neglect=gains[-1],
         gains=np.array(gains),
         by_model=by_model,
         lacking=lacking,
@@ -364,36 +357,6 @@ def _halves_agree(model: CompiledModel, fit: Fit) -> bool:
     """Whether the halves of a run agree in a fit with terms: else something changed, which those terms imitate."""
     found = attempted(lambda: verdict.of_halves(model, fit, verdict.halves_of(fit)))
     return found is not None and not any(one.alarm for one in found)
-
-
-def _or_nan(fit: Fit, computation: Callable[[], Float]) -> Float:
-    """What is computed [n_p]; NaN where its numbers ran away."""
-    found = attempted(computation)
-    return np.full(len(fit.p), np.nan) if found is None else found
-
-
-def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:
-    """Largest relative error of linearised equations on a run."""
-    errors = [0.0]
-    for one in model.signals:
-        if one.neglected:
-            x = np.asarray(run[one.name], np.float64)
-            errors.append(one.neglected * float(np.nanmax(np.abs(x - np.nanmean(x)))) ** 2)
-    return max(errors)
-
-
-def of_known(compiled: CompiledModel, run: Mapping[str, npt.ArrayLike], fit: Fit, known: Known) -> Float:
-    """d p / d constant [n_p], with the weights of the fit: one standard deviation more, and p again."""
-    moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in compiled.knowns)
-    own_scale = fit.rows.compiled.parameters.positive != ready(compiled).parameters.positive
-    other = on_their_own_scale(ready(replace(compiled, knowns=moved)), own_scale)
-    rows = WeakRows.of(other, run, fit.rows.record.grid.design)
-    rows = rows.only(np.isin(rows.numbers, fit.rows.numbers))
-    p, prior = fit.p, fit.parameters.prior(fit.start)
-    theta = rows.compiled.parameters.theta(p)
-    moments = compensated(rows, [rows.white(group, theta, fit.errors) for group in rows.groups], theta)
-    p, _ = gauss_newton(rows.compiled.parameters, moments, p, prior, _STEPS_OF_KNOWN)
-    return np.asarray((p - fit.p) / known.sd)
 
 
 def by_sensors(fit: Fit) -> Fit | None:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.recent import Recent
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import with_corners
 from pvid.model.signals import Integral, Jet
@@ -52,6 +53,9 @@ class Compiled:
         self.channels = Channels(model)
         self.filters = NoiseFilters(self.channels)
         self.parameters = Parameters(model)
+
+
+ready = Recent(Compiled)  # a model with its functions
 
 
 @dataclass(frozen=True)

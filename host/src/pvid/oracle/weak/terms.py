@@ -279,6 +279,7 @@ _DELAY = Act(
     applies=_is_sensor,
     typed="{u} + {a}*{u}.d()",
 )
+DELAY = replace(_DELAY, of=_early, levels=None, most=_quarter, exact=_DELAY)
 _LATE = Act(
     "acts {word} by {size}",
     _shifted,
@@ -325,7 +326,8 @@ ACTS = (
     ),
     Act("acts behind a lag of {size}", _lagged, "time", levels=_samples(0.5, 1, 2, 4, 8, 16), applies=_is_input),
     _LATE,
-    *(replace(one, of=_early, levels=None, most=_quarter, exact=one) for one in (_DELAY, _LATE)),
+    DELAY,
+    replace(_LATE, of=_early, levels=None, most=_quarter, exact=_LATE),
     Act(
         "acts as {u}*(1 {word} {size}*abs({u})/{top})",
         lambda of, _: of.values * np.abs(of.values) / of.top,
