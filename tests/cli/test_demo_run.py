@@ -16,7 +16,7 @@ from pvid.cli.demo_run import demo
 from pvid.identification.values import refined_shifts_of
 
 
-@pytest.mark.parametrize("target", [pytest.param(HOST_TARGET, marks=pytest.mark.night), "mps2-an386"])
+@pytest.mark.parametrize("target", [HOST_TARGET, pytest.param("mps2-an386", marks=pytest.mark.night)])
 def test_a_mechanism_is_identified_compared_and_streamed(
     target: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

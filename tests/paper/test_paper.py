@@ -107,6 +107,7 @@ def test_law_5_by_hand_is_that_in_float64() -> None:
 
 
 @pytest.mark.by_day(4)
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("options", COMPILERS.values(), ids=COMPILERS)
 @pytest.mark.parametrize("core", CORES)
 def test_other_compilers_keep_the_bits(core: Core, options: tuple[str, ...], tmp_path: Path) -> None:
