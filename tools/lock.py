@@ -24,7 +24,7 @@ BUILD, USE, MORE, TESTS = (
     "# for the tests alone",
 )
 USED_EXTRAS = ["models", "page", "plot", "serial"]
-MORE_EXTRAS = ["cluster", "excel", "foxglove", "hdf5", "mcap", "parquet", "ros"]
+MORE_EXTRAS = ["cluster", "excel", "foxglove", "hdf5", "mcap", "parquet", "robot", "ros"]
 INSTALLER, BUILDERS = "uv", ("setuptools",)
 _WINDOWS = re.compile(r"os_name == 'nt'|sys_platform == 'win32'")
 HEADER = "# Written by tools/lock.py from host/pyproject.toml: do not edit.\n"

@@ -30,6 +30,8 @@ import numpy as np
 from click.testing import CliRunner
 
 from pvid.core.host_compiler import compiled_once
+from pvid.model.chain import Chain
+from pvid.models.mechanisms import compiled_of
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -227,8 +229,17 @@ def prepared(folder: Path) -> None:
         shutil.copy("run.toml", "rig.toml")
         Path("tests").symlink_to(ROOT / "tests")  # with recordings that others made
         shutil.copytree(ROOT / "firmware", "firmware", ignore=shutil.ignore_patterns("build"))
-        model = next(one for one in blocks_of(Path("host/docs/models.md")) if one.kind == "python")
-        Path("motor.py").write_text(model.text, encoding="utf-8")
+        for page, name in (("models", "motor.py"), ("robots", "robot.py")):
+            model = next(one for one in blocks_of(Path(f"host/docs/{page}.md")) if one.kind == "python")
+            Path(name).write_text(model.text, encoding="utf-8")
+        shutil.copy(ROOT / "tests/data/robot/arm.urdf", "arm.urdf")
+        assert pvid("model from arm.urdf -o arm.py".split()).code == 0
+        sys.path.insert(0, str(ROOT / "tests"))
+        from robot_arms import log_of
+
+        for seed, name in enumerate(("arm.csv", "other.csv")):
+            log = log_of(chain_of(Path("arm.py")), seed, seconds=10.0, rate=200.0)
+            np.savetxt(name, np.array(list(log.values())).T, delimiter=",", header=",".join(log), comments="")
         scales = {
             "time_ms": ("t", 1e3),
             "ms": ("t", 1e3),
@@ -246,6 +257,13 @@ def prepared(folder: Path) -> None:
         for place, name in (("fleet/a", "run.pvlog"), ("runs", "run.csv"), ("motors/a", "motor.csv")):
             Path(place).mkdir(parents=True)
             shutil.copy(name, place)
+
+
+def chain_of(path: Path) -> Chain:
+    """Of a robot's model file."""
+    chain = compiled_of(path).chain
+    assert chain is not None
+    return chain
 
 
 def with_columns(source: Path, target: Path, scales: dict[str, tuple[str, float]], *, keep: bool = True) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen.formats import FixedProgram
-from pvid.codegen.operations import Argument, Literal, Program
+from pvid.model.operations import Argument, Literal, Program
 
 Float = npt.NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from rounding import FLOAT32, bounds_of
 
 from pvid.base.errors import PvidError
 from pvid.codegen.functions import ModelFunctions, functions_of, identifiers, with_values
-from pvid.codegen.operations import exact, program_of
+from pvid.model.operations import exact, program_of
 from pvid.model.signals import Integral, Jet, sgn
 from pvid.twin.printer.program import loaded
 

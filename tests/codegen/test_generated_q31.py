@@ -22,9 +22,9 @@ from pvid.codegen.formats import bits_of, fixed
 from pvid.codegen.formats import bounds_of as interval_bounds_of
 from pvid.codegen.functions import functions_of
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.operations import evaluated, program_of
 from pvid.codegen.self_test import scaled_of
 from pvid.core.sources import FIRMWARE, INCLUDES
+from pvid.model.operations import evaluated, program_of
 from pvid.twin.printer.program import loaded
 
 PRINTED = 200  # vectors of the twin

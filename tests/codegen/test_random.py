@@ -17,8 +17,8 @@ from rounding import FLOAT32, bounds_of, fixed_bounds_of
 
 from pvid.codegen import c_functions
 from pvid.codegen.formats import bits_of, fixed
-from pvid.codegen.operations import program_of
 from pvid.core.sources import FOLDERS, INCLUDES, source
+from pvid.model.operations import program_of
 from pvid.model.signals import sgn
 from pvid.twin.printer.program import printed_module
 

@@ -18,12 +18,12 @@ from conftest import ROOT
 from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.codegen import files_refine
-from pvid.codegen.operations import Operation
 from pvid.codegen.refine import RefineFunctions, refine_functions, refine_functions_of
 from pvid.core.host_compiler import host_compiler
 from pvid.core.model_library import NATIVE, core_of, of_second_stage
 from pvid.core.sources import FOLDERS, INCLUDES, source
 from pvid.model import Model
+from pvid.model.operations import Operation
 from pvid.model.signals import Jet, sgn
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig

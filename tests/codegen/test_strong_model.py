@@ -17,7 +17,6 @@ from struct_fields import set_field
 from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.codegen import files_strong
-from pvid.codegen.operations import Program, evaluated
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
 from pvid.codegen.strong_library import strong_native
 from pvid.codegen.strong_sums import StrongSums, chains_of, over, strong_sums_of, times
@@ -25,6 +24,7 @@ from pvid.codegen.strong_twin import StrongModelTwin
 from pvid.core.sources import INCLUDES
 from pvid.design.fir import savitzky_golay
 from pvid.model import Model
+from pvid.model.operations import Program, evaluated
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
 from pvid.models import mechanisms

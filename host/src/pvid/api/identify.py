@@ -18,6 +18,7 @@ from pvid.identification.analysis import own_of
 from pvid.identification.core import identify_in_c
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
+from pvid.identification.robot import answer_of_robot
 from pvid.identification.summary import Made
 from pvid.log.rig import source_of
 from pvid.log.rig_choice import common_rig, rig_of
@@ -116,9 +117,11 @@ def _identify(
     recording, compiled = read_all(found, sources, _names(paths), columns)
     in_c = CORES.get(core or "")
     of_each = own_of(compiled, recording, own, shared, in_c=in_c is not None)
-    answer = identified(recording, compiled, refine=False if in_c else refine, own=of_each)
     options = {"model": model, "rig": rig, "columns": columns, "core": core, "refine": refine, **settings}
     made = Made.of(_call(paths, options), files, rig_path, found)
+    if compiled.chain is not None and not (in_c or refine or own or shared):
+        return result_of(answer_of_robot(recording, compiled), made, columns)
+    answer = identified(recording, compiled, refine=False if in_c else refine, own=of_each)
     return result_of(answer if in_c is None else identify_in_c(answer, in_c.name), made, columns)
 
 

@@ -21,6 +21,7 @@ PACKAGES = {
     "mcap_protobuf": "mcap-protobuf-support",
     "mcap_ros1": "mcap-ros1-support",
     "mcap_ros2": "mcap-ros2-support",
+    "mujoco": "mujoco",
     "openpyxl": "openpyxl",
     "pandas": "pandas",
     "pyarrow": "pyarrow",

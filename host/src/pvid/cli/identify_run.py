@@ -97,6 +97,11 @@ def identify_run(
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = rig.compiled().name
+    if rig.compiled().chain is not None:
+        asked: dict[str, Any] = {"--on": on, "--refine": refine, "--add": add, "--own": own, "--shared": shared}
+        asked |= {"--weights": weights != "residuals", "--figure": pictures.figure, "--report": pictures.report}
+        asked |= {f"--{option} {value}": value for option, value in only_in_c.items()}
+        return _identified_robot(paths, rig, columns, other, asked, as_json=as_json)
     if len(paths) > 1:
         _refuse_several(on=on, refine=bool(refine), **only_in_c)
     if only_in_c.get("form") == STRONG_FORM:
@@ -170,6 +175,33 @@ def identify_run(
         write_stderr("pvid: note: the analysis in float64 takes all windows alike: [identifier] has no effect")
     pictures.write(shown, validation, "" if other is None else other.name)
     return done
+
+
+def _identified_robot(
+    paths: Sequence[Path],
+    rig: MechanismRig,
+    columns: str | None,
+    other: Path | None,
+    asked: Mapping[str, Any],
+    *,
+    as_json: bool,
+) -> int:
+    """Identifies recordings of a robot and prints the answer."""
+    from pvid.identification.robot import answer_of_robot
+
+    for option, value in asked.items():
+        if value and option not in ("--core f64", "--form weak"):
+            rig.compiled().refuse_robot(option)
+    recording, model = recordings_of(paths, rig, columns)
+    with working("identifying"):
+        answer = answer_of_robot(recording, model)
+    more: dict[str, Any] = {}
+    lines: list[str] = []
+    if other is not None:
+        found = answer.predicts(recordings_of([other], rig, columns)[0])
+        more = {"validation": {"prediction": {one.name: one.as_json() for one in found}}}
+        lines = [f"{other}: the answer predicts {listed(found)}"]
+    return _told(answer, as_json=as_json, more=more, lines=lines)
 
 
 def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> None:

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import columns_option, force_option
+from pvid.cli.input import NewFile, columns_option, force_option, listed_names
 from pvid.cli.rig_design import analysis_of, model_of_rig, recorded
 from pvid.cli.simulate import ABOVE_0, numbers, of_model, start_option
 
@@ -42,6 +42,32 @@ def command() -> None:
 command.add_command(of_model)
 
 
+@command.command(name="from")
+@click.argument("path", metavar="FILE", type=click.Path(path_type=Path, dir_okay=False))
+@click.option("-o", "--out", required=True, type=NewFile(), help="Model file to write.")
+@click.option(
+    "--joints",
+    metavar="NAME,...",
+    multiple=True,
+    help="Joints that move and are recorded, from the base outwards; others are held at their zero.  [default: all]",
+)
+@force_option
+def from_file(path: Path, out: Path, joints: tuple[str, ...]) -> int:
+    """Writes a model file of the robot in FILE, a URDF or MJCF file on a fixed base.
+
+    `pvid identify LOG --model` then gives its base parameters from a log with the columns q1, tau1, q2, tau2, .. in
+    the order of the joints (host/docs/robots.md).
+    """
+    from pvid.base.atomic_write import write_whole
+    from pvid.models.mechanisms import compiled_of
+    from pvid.models.robot_file import model_text
+
+    write_whole(out, model_text(path, listed_names(joints)))
+    compiled = compiled_of(out)
+    click.echo(f"{out}: {len(compiled.signals) // 2} joints, {len(compiled.unknowns)} base parameters")
+    return DONE
+
+
 @command.command()
 @_MODEL
 def check(model: str) -> int:
@@ -50,12 +76,15 @@ def check(model: str) -> int:
     Exit code 3: a parameter is not identifiable; the report names the combination that is.
     """
     from pvid.codegen.weak_sizes import too_many_unknowns
-    from pvid.model.report import check_report, identifiable
+    from pvid.model.report import check_report, identifiable, robot_report
     from pvid.models.mechanisms import compiled_of
     from pvid.models.registry import asked_for
     from pvid.oracle.weak.parameters import Parameters
 
     compiled = compiled_of(asked_for(model))
+    if compiled.chain is not None:
+        click.echo(robot_report(compiled))
+        return DONE
     Parameters(compiled).checked(None)  # raises where the constraints contradict each other
     if (refusal := too_many_unknowns(compiled.name, len(compiled.unknowns))) is not None:
         write_stderr(f"pvid: note: {refusal}")

@@ -14,8 +14,8 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.codegen.formats import FixedProgram, angle_of, nearest, shift_of, width_of
-from pvid.codegen.operations import Argument, Literal, Program
 from pvid.design.c_tables import float_literal
+from pvid.model.operations import Argument, Literal, Program
 
 
 @dataclass(frozen=True)

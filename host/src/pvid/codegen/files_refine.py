@@ -16,7 +16,6 @@ from pvid.codegen import describe
 from pvid.codegen.c_functions import Language, c_literal, call_of, definition, statements
 from pvid.codegen.c_text import c_comment, guarded, initialised, number
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.operations import Literal, Program
 from pvid.codegen.refine import (
     RefineFunction,
     RefineFunctions,
@@ -29,6 +28,7 @@ from pvid.codegen.refine import (
     signs_of,
     widths,
 )
+from pvid.model.operations import Literal, Program
 from pvid.settings.refine import BIG_STEP, RefineConfig
 
 WRITTEN = {  # by the core's functions, whatever the model has of it

@@ -13,9 +13,9 @@ from pvid.codegen.c_functions import Language, c_literal, call_of, statements
 from pvid.codegen.c_text import UNCONTRACTED, banner, c_comment, for_cpp, guarded
 from pvid.codegen.functions import Function
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.operations import Program, exact
 from pvid.codegen.strong import StrongFunctions
 from pvid.codegen.strong_sums import Monomial, StrongSums, strong_sums_of, text_of
+from pvid.model.operations import Program, exact
 
 _HEADER = """\
 /* Settings. They must outlive the identifier, unchanged. */

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from pvid.base.errors import PvidError
-from pvid.codegen.operations import Argument, Literal, Operation, Program
+from pvid.model.operations import Argument, Literal, Operation, Program
 
 Interval = tuple[float, float]
 

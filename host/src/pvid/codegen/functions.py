@@ -18,8 +18,8 @@ from functools import cached_property
 import sympy as sp
 
 from pvid.base.errors import PvidError
-from pvid.codegen.operations import Program, exact, program_of
 from pvid.model.compiled import CompiledModel, Part
+from pvid.model.operations import Program, exact, program_of
 from pvid.model.signals import TIME, Integral, Jet, jets, sgn, total_derivative
 
 _RESERVED = frozenset(

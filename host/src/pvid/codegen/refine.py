@@ -34,8 +34,8 @@ from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.base.wording import listed
 from pvid.codegen.functions import identifiers, with_values
-from pvid.codegen.operations import Argument, Builder, Literal, Operation, Program, Value, evaluated
 from pvid.model.compiled import CompiledModel
+from pvid.model.operations import Argument, Builder, Literal, Operation, Program, Value, evaluated
 from pvid.model.signals import Integral, Jet, jets, sgn
 
 _ZERO, _ONE = sp.Integer(0), sp.Integer(1)

@@ -13,8 +13,8 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.codegen.functions import Function, Input, ModelFunctions, functions_of
-from pvid.codegen.operations import program_of
 from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.operations import program_of
 from pvid.model.signals import Jet
 
 MAX_ORDER = 4  # of a differentiator

@@ -21,8 +21,8 @@ from math import comb
 
 import sympy as sp
 
-from pvid.codegen.operations import Builder, Program
 from pvid.codegen.strong import StrongFunctions
+from pvid.model.operations import Builder, Program
 
 Monomial = tuple[tuple[int, int], ...]  # (atom, power), by ascending atoms; () is 1
 Polynomial = dict[Monomial, sp.Expr]  # monomial -> coefficient in p

@@ -18,10 +18,10 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.codegen.functions import Function, ModelFunctions, functions_of, identifiers
-from pvid.codegen.operations import program_of
 from pvid.codegen.weak_sizes import refuse_too_many_unknowns, sizes_of_model
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import OfInput
+from pvid.model.operations import program_of
 from pvid.model.signals import Integral, Jet, jets
 from pvid.oracle.weak.channels import Channel, Channels
 from pvid.oracle.weak.identify import ready

@@ -42,6 +42,7 @@ def analysed(
     PvidError
         When the recording is too short, or holds a signal beyond all reason.
     """
+    model.refuse_robot()
     refuse_constant(recording, model)
     model = with_edges(as_sampled(model, recording.ticks_between), recording.run, recording.sample_rate)
     names = [one.name for one in recording.origins]

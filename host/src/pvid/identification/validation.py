@@ -290,6 +290,7 @@ def predicted(
     PvidError
         Also where a parameter has no value.
     """
+    model.refuse_robot("`pvid validate`")
     model = model.alone
     of_each = {name: [value for key, value in values.items() if key.startswith(f"{name}[")] for name in model.p_names}
     own = {name: [one for one in each if one is not None] for name, each in of_each.items() if each}

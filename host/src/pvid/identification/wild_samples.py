@@ -172,7 +172,12 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     changed = dict(recording.signals)
     notes = list(recording.notes)
     span = max(_SHORTEST, round(_SPAN * recording.sample_rate))
-    orders = {one.name: max(order_of(equation, [one.name]) for equation in model.equations) for one in model.signals}
+    orders = {
+        one.name: max((order_of(equation, [one.name]) for equation in model.equations), default=0)
+        for one in model.signals
+    }
+    if model.chain is not None:
+        orders |= {one.name: 2 for one in model.signals if one.kind == "sensor"}
     steady = _steady(recording, model)
     sensors = [one.name for one in model.signals if one.kind == "sensor"]
     for one in model.signals:

@@ -4,6 +4,7 @@ in theta(p), which every other part of the package works with."""
 from sympy import cos, pi, sin, sqrt
 
 from pvid.model.description import Model
+from pvid.model.robot import Robot
 from pvid.model.signals import Integral, sgn
 
-__all__ = ["Integral", "Model", "cos", "pi", "sgn", "sin", "sqrt"]
+__all__ = ["Integral", "Model", "Robot", "cos", "pi", "sgn", "sin", "sqrt"]

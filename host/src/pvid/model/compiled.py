@@ -11,6 +11,7 @@ from typing import Literal
 import sympy as sp
 
 from pvid.base.errors import PvidError
+from pvid.model.chain import Chain
 from pvid.model.signals import Jet
 from pvid.settings.forms import FORMS
 
@@ -295,6 +296,7 @@ class CompiledModel:
     drifts : directions in which alone p changes in time, each [n_p], in p and known constants
     drift_s : time constant of what the rows tell along them [s]
     anchors : unknowns of drifts that are in no equation -> standard deviation of their start, all that is known of them
+    chain : of a robot, which has no rows and equations: p are its base parameters
     """
 
     name: str
@@ -315,6 +317,7 @@ class CompiledModel:
     drifts: tuple[tuple[sp.Expr, ...], ...] = ()
     drift_s: float = 0.0
     anchors: Mapping[sp.Symbol, float] = field(default_factory=dict)
+    chain: Chain | None = None
 
     @cached_property
     def alone(self) -> CompiledModel:
@@ -342,6 +345,11 @@ class CompiledModel:
                 f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in float64 and "
                 "float32 does"
             )
+
+    def refuse_robot(self, what: str = "this command") -> None:
+        """PvidError by what takes no robot."""
+        if self.chain is not None:
+            raise PvidError(f"{self.name} is a robot, which {what} does not take: `pvid identify` in float64 does")
 
     @property
     def p(self) -> tuple[sp.Symbol, ...]:

@@ -26,6 +26,27 @@ def check_report(compiled: CompiledModel) -> str:
     return "\n\n".join(block for block in blocks if block)
 
 
+def robot_report(compiled: CompiledModel) -> str:
+    """The same of a robot: its base parameters in closed form, with their values in its file."""
+    chain = compiled.chain
+    assert chain is not None
+    names = {chain.standard[place].name for one in chain.base for place, _ in one.parts}
+    none = [one.name for one in chain.standard if one.name not in names]
+    program, _ = chain.program([one.standard for one in chain.base])
+    lines = [
+        f"{compiled.title}: {len(chain.joints)} joints, {len(chain.base)} base parameters, {chain.inertial} of them "
+        f"of the bodies; {program.cost} a sample.",
+        "Identifiable: all base parameters, given enough excitation. A parameter with _R stands for a combination:",
+        "",
+    ]
+    for one in chain.base:
+        value, form = chain.of_file(one), chain.closed_form(one)
+        unit = chain.standard[one.standard].unit
+        shown = "" if value is None else f", {value:.6g} {unit} in the file"
+        lines.append(f"  {chain.name_of(one)} [{unit}]{f' = {form}' if len(one.parts) > 1 else ''}{shown}")
+    return "\n".join([*lines, *(["", f"No torque depends on {listed(none)}."] if none else [])])
+
+
 def _tied(compiled: CompiledModel) -> str:
     """Which unknowns the constraints tie, and which drift."""
     lines, count = [], len(compiled.constraints)

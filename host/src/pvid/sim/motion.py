@@ -62,6 +62,7 @@ def motion_of(model: CompiledModel) -> Motion:
     PvidError
         When they are too few, not linear in the highest derivatives, or do not determine them.
     """
+    model.refuse_robot()
     inputs_of = {one.name: one for one in model.signals if one.driven or one.kind == "input"}
     free = [one.name for one in model.signals if one.name not in inputs_of] + [one.of for one in model.hidden]
     equations, folds, integrands = _without_integrals(model.equations)

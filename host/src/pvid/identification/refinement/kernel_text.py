@@ -19,7 +19,6 @@ import sympy as sp
 
 import pvid.codegen
 from pvid.codegen.files_refine import DOUBLE, function
-from pvid.codegen.operations import Program
 from pvid.codegen.refine import (
     RefinedParameter,
     RefineFunction,
@@ -29,6 +28,7 @@ from pvid.codegen.refine import (
 )
 from pvid.core.sources import cache_folder, keep_text, kept_text
 from pvid.model.compiled import CompiledModel
+from pvid.model.operations import Program
 from pvid.model.signals import Jet
 
 _NO_PROGRAM = Program((), (), ())

@@ -45,6 +45,7 @@ class Compiled:
     _numbers = itertools.count()
 
     def __init__(self, model: CompiledModel) -> None:
+        model.refuse_robot()
         self.number = next(Compiled._numbers)
         self.bare = model
         model, self.jumps = with_corners(model)

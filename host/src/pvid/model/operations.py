@@ -1,4 +1,4 @@
-"""SymPy expressions as one list of three-address operations.
+"""SymPy expressions, and what a function of numbers computes, as one list of three-address operations.
 
 Every printer reads this list: an operation has at most two operands, each value is computed once, and the order of the
 operands is fixed here. `evaluated` computes it in numpy.
@@ -154,6 +154,71 @@ def program_of(
     return Program(tuple(names or map(str, arguments)), tuple(builder.values), results)
 
 
+class Traced:
+    """A number of a function that is traced; constants are folded, and products with 0 and 1, so that a value is one or
+    a float."""
+
+    def __init__(self, builder: Builder, place: int) -> None:
+        self._builder, self.place = builder, place
+
+    def _do(self, kind: Kind, *operands: Traced | float) -> Traced:
+        places = (self._builder.constant(one) if isinstance(one, float | int) else one.place for one in operands)
+        return Traced(self._builder, self._builder.operation(kind, *places))
+
+    def __add__(self, other: Traced | float) -> Traced:
+        return self if isinstance(other, float | int) and other == 0 else self._do("+", self, other)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Traced:
+        return self._do("neg", self)
+
+    def __sub__(self, other: Traced | float) -> Traced | float:
+        if isinstance(other, Traced) and other.place == self.place:
+            return 0.0
+        return self if isinstance(other, float | int) and other == 0 else self._do("-", self, other)
+
+    def __rsub__(self, other: float) -> Traced:
+        return -self if other == 0 else self._do("-", other, self)
+
+    def __mul__(self, other: Traced | float) -> Traced | float:
+        if isinstance(other, Traced):
+            return self._do("*", self, other)
+        if other in (0, 1):
+            return self if other else 0.0
+        return -self if other == -1 else self._do("*", self, other)
+
+    __rmul__ = __mul__
+
+    def sin(self) -> Traced:
+        """Its sine."""
+        return self._do("sin", self)
+
+    def cos(self) -> Traced:
+        """Its cosine."""
+        return self._do("cos", self)
+
+
+def traced(arguments: Sequence[str], function: Callable[[list[Traced]], Sequence[Traced | float]]) -> Program:
+    """The operations that a function does with its arguments, those that its results need alone."""
+    builder = Builder([], {})
+    given = [Traced(builder, builder.argument(place)) for place in range(len(arguments))]
+    found = function(given)
+    results = [one.place if isinstance(one, Traced) else builder.constant(one) for one in found]
+    needed = set(results)
+    for place in range(len(builder.values) - 1, -1, -1):
+        value = builder.values[place]
+        if place in needed and isinstance(value, Operation):
+            needed.update(value.operands)
+    new = {place: k for k, place in enumerate(sorted(needed))}
+    values = [builder.values[place] for place in new]
+    moved = (
+        Operation(one.kind, tuple(new[k] for k in one.operands)) if isinstance(one, Operation) else one
+        for one in values
+    )
+    return Program(tuple(arguments), tuple(moved), tuple(new[place] for place in results))
+
+
 class Builder:
     """The list as it grows; equal values share a place.
 
@@ -182,7 +247,16 @@ class Builder:
             self.values.append(value)
         return self._places[value]
 
-    def _do(self, kind: Kind, *operands: int) -> int:
+    def constant(self, value: float) -> int:
+        """The place of a number."""
+        return self._put(Literal(Fraction(value)))
+
+    def argument(self, place: int) -> int:
+        """The place of an input."""
+        return self._put(Argument(place))
+
+    def operation(self, kind: Kind, *operands: int) -> int:
+        """The place of an operation."""
         if kind in _COMMUTES:
             operands = tuple(sorted(operands, key=lambda place: (not isinstance(self.values[place], Literal), place)))
         return self._put(Operation(kind, operands))
@@ -209,26 +283,26 @@ class Builder:
         """Positive terms and differences: no term is negated but a sum that has negative terms only."""
         signed = [(_is_negative(term), term) for term in terms]
         if all(negative for negative, _ in signed):
-            return self._do("neg", self._sum([-term for _, term in signed]))
+            return self.operation("neg", self._sum([-term for _, term in signed]))
         first = next(k for k, (negative, _) in enumerate(signed) if not negative)
         total = self.place_of(signed[first][1])
         for negative, term in signed[:first] + signed[first + 1 :]:
             if negative:
-                total = self._do("-", total, self.place_of(-term))
+                total = self.operation("-", total, self.place_of(-term))
             else:
-                total = self._do("+", total, self.place_of(term))
+                total = self.operation("+", total, self.place_of(term))
         return total
 
     def _product(self, e: sp.Expr) -> int:
         constant, rest = e.as_independent(*e.free_symbols, as_Add=False)
         factor = exact(constant)
         if factor < 0:
-            return self._do("neg", self.place_of(-e))
+            return self.operation("neg", self.place_of(-e))
         parts = sorted(sp.Mul.make_args(rest), key=sp.default_sort_key)
         ahead = [one for one in parts if self._is_fixed(one)]
         if ahead and len(ahead) < len(parts) and (len(ahead) > 1 or factor != 1 or not ahead[0].is_Symbol):
             first = self.place_of(sp.Mul(constant, *ahead))
-            return self._do("*", first, self.place_of(sp.Mul(*[one for one in parts if one not in ahead])))
+            return self.operation("*", first, self.place_of(sp.Mul(*[one for one in parts if one not in ahead])))
         above: list[int] = []
         below: list[int] = []
         for one in parts:
@@ -239,9 +313,9 @@ class Builder:
         numerator = self._all(above)
         if factor != 1 or numerator is None:
             literal = self._put(Literal(factor))
-            numerator = literal if numerator is None else self._do("*", literal, numerator)
+            numerator = literal if numerator is None else self.operation("*", literal, numerator)
         denominator = self._all(below)
-        return numerator if denominator is None else self._do("/", numerator, denominator)
+        return numerator if denominator is None else self.operation("/", numerator, denominator)
 
     def _is_fixed(self, e: sp.Expr) -> bool:
         """Whether it depends on fixed arguments alone; never where there are none."""
@@ -257,17 +331,17 @@ class Builder:
         """Their product from the left."""
         product: int | None = None
         for one in factors:
-            product = one if product is None else self._do("*", product, one)
+            product = one if product is None else self.operation("*", product, one)
         return product
 
     def _power(self, base: sp.Expr, exponent: sp.Expr) -> int:
         if exponent.is_number and exponent.is_negative:
-            return self._do("/", self._put(Literal(Fraction(1))), self.place_of(base**-exponent))
+            return self.operation("/", self._put(Literal(Fraction(1))), self.place_of(base**-exponent))
         if exponent == sp.Rational(1, 2):
-            return self._do("sqrt", self.place_of(base))
+            return self.operation("sqrt", self.place_of(base))
         if exponent.is_Rational and exponent.q == 2:
-            root = self._do("sqrt", self.place_of(base))
-            return self._do("*", self._integer_power(self.place_of(base), int(exponent.p) // 2), root)
+            root = self.operation("sqrt", self.place_of(base))
+            return self.operation("*", self._integer_power(self.place_of(base), int(exponent.p) // 2), root)
         if not exponent.is_Integer:
             raise PvidError(f"{base**exponent} cannot be generated: powers are integers or halves")
         return self._integer_power(self.place_of(base), int(exponent))
@@ -277,23 +351,23 @@ class Builder:
         if exponent == 1:
             return base
         half = self._integer_power(base, exponent // 2)
-        square = self._do("*", half, half)
-        return self._do("*", square, base) if exponent % 2 else square
+        square = self.operation("*", half, half)
+        return self.operation("*", square, base) if exponent % 2 else square
 
     def _function(self, e: sp.Expr) -> int:
         if isinstance(e, sp.tan):
-            return self._do("/", self.place_of(sp.sin(e.args[0])), self.place_of(sp.cos(e.args[0])))
+            return self.operation("/", self.place_of(sp.sin(e.args[0])), self.place_of(sp.cos(e.args[0])))
         if isinstance(e, sp.sin):
-            return self._do("sin", self.place_of(e.args[0]))
+            return self.operation("sin", self.place_of(e.args[0]))
         if isinstance(e, sp.cos):
-            return self._do("cos", self.place_of(e.args[0]))
+            return self.operation("cos", self.place_of(e.args[0]))
         if isinstance(e, sp.Abs):
-            return self._do("abs", self.place_of(e.args[0]))
+            return self.operation("abs", self.place_of(e.args[0]))
         if isinstance(e, sgn | sp.sign):
             width = self._widths.get(str(e.args[0]), 0.0)
             if width > 0:
-                return self._do("soft_sign", self.place_of(e.args[0]), self._put(Literal(Fraction(width))))
-            return self._do("sign", self.place_of(e.args[0]))
+                return self.operation("soft_sign", self.place_of(e.args[0]), self._put(Literal(Fraction(width))))
+            return self.operation("sign", self.place_of(e.args[0]))
         raise PvidError(
             f"{e} cannot be generated: the functions are sin, cos, tan, sgn, abs and sqrt; describe the mechanism with "
             f"these, or give {e.func} of a signal as a signal of its own"

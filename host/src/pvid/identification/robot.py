@@ -1,0 +1,165 @@
+"""The answer of a robot's recording: base parameters, and how well they predict torques."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pvid.base.wording import listed
+from pvid.identification.answer import Answer, Factors, Float, Value
+from pvid.identification.sensor_prediction import SensorPrediction
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.robot import RobotFit, RobotRun, identify_robot
+from pvid.oracle.weak.verdict import Reason, Verdict
+from pvid.rig.run import Recording
+
+_CLASH = 4.5  # standard errors between the halves: one of 60 parameters is as far apart once in 2000 runs
+_EXPLAINED = 0.9  # R^2 of a torque below which the equations do not explain it
+
+
+@dataclass(frozen=True, eq=False)
+class RobotAnswer(Answer):
+    """An identification of a robot in float64.
+
+    Attributes
+    ----------
+    model, recording, values, advice : as of Answer
+    fit : the estimate
+    """
+
+    model: CompiledModel
+    fit: RobotFit
+    values: Mapping[str, Value]
+    recording: Recording
+    advice: tuple[str, ...] = ()
+
+    @property
+    def identified(self) -> bool:
+        """Whether at least one parameter is."""
+        return self.verdict.identified
+
+    @property
+    def identifier(self) -> str:
+        """Form and arithmetic."""
+        return "base parameters, weak form, float64"
+
+    @cached_property
+    def prediction(self) -> tuple[SensorPrediction, ...]:
+        """Of the torques in either half of the recording by the parameters of the other."""
+        return torques_of(self.model, self.fit, self.fit.run, self.fit.halves[::-1])
+
+    def predicts(self, other: Recording) -> tuple[SensorPrediction, ...]:
+        """How well it predicts the torques of another recording."""
+        run = RobotRun(self.model, other.run, other.sample_rate)
+        return torques_of(self.model, self.fit, run, self.fit.p[np.newaxis])
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """What the run does not determine, and what contradicts itself."""
+        names, fit = self.model.p_names, self.fit
+        lost = [name for name, one in zip(names, fit.undetermined, strict=True) if one]
+        if len(lost) == len(names):
+            return Verdict((Reason("not_identified", "the motion determines no parameter: do the joints move?"),))
+        reasons = []
+        if lost:
+            text = f"the motion does not determine {listed(lost)}: move more joints at the same time, and faster"
+            reasons.append(Reason("undetermined", text, of=tuple(lost)))
+        apart = [name for name, far in zip(names, fit.apart, strict=True) if far > _CLASH and name not in lost]
+        if apart:
+            text = f"the two halves of the recording disagree about {listed(apart)}: does friction change with heat?"
+            reasons.append(Reason("halves", text, of=tuple(apart)))
+        weak = [one.name for one in self.prediction if one.r2 < _EXPLAINED]
+        if weak:
+            text = (
+                f"less than {_EXPLAINED:.0%} of {listed(weak)} is explained on unseen motion: check signs, units, gear "
+                "ratios and the order of the joints, or a drive that bends"
+            )
+            reasons.append(Reason("unpredicted", text))
+        return Verdict(tuple(reasons))
+
+    @property
+    def lines(self) -> list[str]:
+        """Windows, combinations, and the prediction."""
+        chain, design = self.model.chain, self.fit.design
+        assert chain is not None
+        combined = [one for one in chain.base if len(one.parts) > 1]
+        lines = [
+            f"verdict {self.verdict.word}; {self.fit.windows} windows of {design.functions.length:.3g} s; rates over "
+            f"{design.taps} samples",
+            *(f"{chain.name_of(one)} = {chain.closed_form(one)}" for one in combined),
+        ]
+        return [*lines, f"predicts torques that were not fitted: {listed(self.prediction)}"]
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        chain = self.model.chain
+        assert chain is not None
+        out = super().as_json()
+        for one in chain.base:
+            entry = out["parameters"][chain.name_of(one)]
+            entry |= {"combination": chain.closed_form(one), "file": chain.of_file(one)}
+        return out | {
+            "prediction": {one.name: one.as_json() for one in self.prediction},
+            "window_s": self.fit.design.functions.length,
+            "windows": self.fit.windows,
+            "core": "f64",
+            "form": "weak",
+        }
+
+
+def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
+    """Base parameters of a robot from all segments of a recording.
+
+    Raises
+    ------
+    PvidError
+        When the recording is too short.
+    """
+    fit = identify_robot(model, recording.run, recording.sample_rate)
+    signals = {one.name: one.gain_sd for one in model.signals if one.kind == "input"}
+    constants = {one.name: one.sd / abs(one.value) for one in model.knowns if one.value}
+    gains = np.array([math.hypot(sd, constants.get(f"kt{k + 1}", 0.0)) for k, sd in enumerate(signals.values())])
+    scale: Float = gains[:, np.newaxis] * fit.by_gain
+    sizes, directions = np.linalg.eigh(fit.covariance)
+    noise = directions * np.sqrt(np.maximum(sizes, 0.0))
+    values = {}
+    for k, unknown in enumerate(model.unknowns):
+        if fit.undetermined[k]:
+            values[unknown.name] = Value(
+                unknown.unit, None, None, None, "not_identified", "the motion does not determine it",
+                word="not_identified",
+            )  # fmt: skip
+            continue
+        parts = [float(np.linalg.norm(one)) for one in (noise[k], scale[:, k])]
+        factors = Factors(noise[k], scale[:, k], np.zeros(0))
+        values[unknown.name] = Value(
+            unknown.unit, float(fit.p[k]), math.hypot(*parts), parts[0], se_scale=parts[1], se_model=0.0,
+            factors=factors,
+        )  # fmt: skip
+    return RobotAnswer(model, fit, values, recording)
+
+
+def torques_of(
+    model: CompiledModel, fit: RobotFit, run: RobotRun, p: Sequence[Float] | Float
+) -> tuple[SensorPrediction, ...]:
+    """Measured torques of a run less those of parameters [.., p]: of several, each has its part of the run."""
+    left, moved, size = np.zeros(len(run.chain.joints)), np.zeros(len(run.chain.joints)), 0
+    pieces = list(fit.predicted(run, np.asarray(p)))
+    steps = sum(one.shape[1] for one, _ in pieces)
+    for measured, predicted in pieces:
+        place = (np.arange(measured.shape[1]) + size) * len(p) // steps
+        own = predicted[:, place, np.arange(len(place))]
+        left += np.sum((measured - own) ** 2, axis=1)
+        moved += np.sum((measured - measured.mean(axis=1, keepdims=True)) ** 2, axis=1)
+        size += len(place)
+    out = []
+    for k, joint in enumerate(run.chain.joints):
+        part = float(np.sqrt(left[k] / max(moved[k], 1e-300)))
+        rms = float(np.sqrt(left[k] / size))
+        out.append(SensorPrediction(f"tau{k + 1}", "N" if joint.prismatic else "N*m", rms, part, None))
+    return tuple(out)

@@ -1,0 +1,133 @@
+"""A robot on a fixed base: joints with encoders, each driven by a torque that is recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import sympy as sp
+
+from pvid.model.chain import INERTIAL, Base, Chain, Joint, rotation_of
+from pvid.model.compiled import CompiledModel, Unknown
+from pvid.model.description import Model
+
+MOST_JOINTS = 12
+_ENCODER, _SCALE = 2 * math.pi / 2**16, 1e-5  # resolutions unless given [rad], [m]
+_UNIT = 1e-6  # of the length of an axis
+
+
+class Robot(Model):
+    """A mechanism of rigid bodies in a tree of joints; `compiled` has its base parameters as unknowns.
+
+    The signals are q1, tau1, q2, tau2, .. in the order of the joints; a joint with a torque constant has a current i1
+    in place of tau1.
+    """
+
+    def __init__(self, title: str, gravity: Sequence[float] = (0.0, 0.0, -9.81)) -> None:
+        super().__init__(title)
+        self.joints: list[Joint] = []
+        self.gravity = self._three("gravity", gravity)
+
+    def joint(
+        self,
+        name: str,
+        axis: Sequence[float],
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        rpy: Sequence[float] = (0.0, 0.0, 0.0),
+        parent: str | None = None,
+        prismatic: bool = False,
+        inertial: Sequence[float] | None = None,
+        rotor: float | None = None,
+        offset: bool = False,
+        torque_constant: float | None = None,
+        resolution: float | None = None,
+        hold: Literal["zoh", "sampled"] = "sampled",
+    ) -> None:
+        """A joint and the body that it moves; the frame of the body has its origin on the axis.
+
+        Parameters
+        ----------
+        axis : in the body's frame
+        origin, rpy : of the body's frame at q = 0 in that of its parent, as in URDF [m], [rad]
+        parent : joint that carries this one, or "base"; the one before by default
+        prismatic : it slides along the axis
+        inertial
+            m, hx, hy, hz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of the file [kg, kg*m, kg*m^2]: h is m times the centre, I about
+            the frame's origin; they are what the answer is compared with
+        rotor : inertia of the motor's rotor at the joint, gear included [kg*m^2]; None: it has none
+        offset : the recorded torque has a constant offset, which is identified
+        torque_constant : torque at the joint per ampere [N*m/A]: a current i1 is recorded
+        resolution : of the encoder [rad, m]
+        hold : "zoh" for a torque that is commanded and held from sample to sample
+        """
+        number = len(self.joints) + 1
+        if number > MOST_JOINTS:
+            raise self._refused(f"a robot has at most {MOST_JOINTS} joints")
+        names = [one.name for one in self.joints]
+        if name in names:
+            raise self._refused(f"the joint {name} is there twice")
+        if parent not in (None, "base", *names):
+            raise self._refused(f"{name}: its parent {parent} is no joint before it")
+        along = np.array(self._three(f"{name}: axis", axis))
+        size = float(np.linalg.norm(along))
+        if abs(size - 1) > _UNIT:
+            raise self._refused(f"{name}: the axis {tuple(axis)} must have the length 1, not {size:g}")
+        given = None if inertial is None else tuple(float(one) for one in inertial)
+        if given is not None and (len(given) != len(INERTIAL) or not np.isfinite(given).all()):
+            raise self._refused(f"{name}: inertial has {len(INERTIAL)} numbers: {', '.join(INERTIAL)}")
+        if resolution is None:
+            resolution = _SCALE if prismatic else _ENCODER
+        self.sensor(f"q{number}", "m" if prismatic else "rad", resolution=resolution, reach=math.pi, gain_sd=0.0)
+        if torque_constant is None:
+            self.input(f"tau{number}", "N" if prismatic else "N*m", hold=hold, reach=100.0)
+        else:
+            self.input(f"i{number}", "A", hold=hold, reach=100.0)
+            self.known(f"kt{number}", "N/A" if prismatic else "N*m/A", torque_constant)
+        self.joints.append(
+            Joint(
+                name,
+                number - 2 if parent is None else -1 if parent == "base" else names.index(parent),
+                (along[0] / size, along[1] / size, along[2] / size),
+                self._three(f"{name}: origin", origin),
+                rotation_of(self._three(f"{name}: rpy", rpy)),
+                prismatic,
+                given,
+                None if rotor is None else float(rotor),
+                offset,
+            )
+        )
+
+    def compiled(self, name: str = "") -> CompiledModel:
+        """Its base parameters and signals; rows are computed by recursion (pvid.model.chain)."""
+        if not self.joints:
+            raise self._refused(f"{self.title}: the robot has no joint")
+        chain = Chain(tuple(self.joints), self.gravity)
+        return CompiledModel(
+            name or "robot",
+            self.title,
+            tuple(self.signals),
+            tuple(_unknown(chain, one) for one in chain.base),
+            tuple(self.knowns),
+            (),
+            (),
+            clock_sd=0.0,
+            chain=chain,
+        )
+
+    def _three(self, what: str, given: Sequence[float]) -> tuple[float, float, float]:
+        try:
+            x, y, z = (float(one) for one in given)
+        except (TypeError, ValueError):
+            x = y = z = math.nan
+        if not math.isfinite(x + y + z):
+            raise self._refused(f"{what} has three numbers, not {given}")
+        return x, y, z
+
+
+def _unknown(chain: Chain, base: Base) -> Unknown:
+    """Any value is possible: the guess is that of the file."""
+    name, unit = chain.name_of(base), chain.standard[base.standard].unit
+    guess = chain.of_file(base) or 0.0
+    return Unknown(sp.Symbol(name, real=True), unit, guess, False, -math.inf, math.inf, abs(guess) or 1.0)

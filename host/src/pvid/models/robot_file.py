@@ -1,0 +1,221 @@
+"""A model file from a robot's URDF or MJCF file, which MuJoCo reads."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.base.packages import lacking
+from pvid.base.wording import listed, printable, reason
+from pvid.model.robot import MOST_JOINTS
+
+Float = npt.NDArray[np.float64]
+_ROUNDED = 10  # digits behind the point
+_TWELFTHS = 1e-9  # of pi: an angle that is as close to a twelfth of a half turn is that
+_LOCKED = 1e-6  # cosine of the pitch below which roll and yaw turn about one axis
+_TOP, _LEAST_MASS = 80, 1e-9
+
+
+def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
+    """The text of a model file.
+
+    Parameters
+    ----------
+    path : URDF or MJCF
+    chosen : names of the joints that move and are recorded, in the order of the columns; others are held at their zero;
+        (): all
+
+    Raises
+    ------
+    PvidError
+        Where the file cannot be read, or is no robot on a fixed base with known inertias.
+    """
+    mujoco, model = _read(path)
+    joints = _chosen(mujoco, model, path, chosen)
+    data = mujoco.MjData(model)
+    data.qpos[[model.jnt_qposadr[one] for one in joints]] = 0.0
+    mujoco.mj_kinematics(model, data)
+    carrier = _carriers(model, joints)
+    _refuse_loops(mujoco, model, carrier, path)
+    lines = [
+        json.dumps(f"{printable(path.name)}: {len(joints)} joints, by `pvid model from`."),
+        "",
+        "from pvid.model import Robot, pi",
+        "",
+        f"model = Robot({json.dumps(printable(path.stem))}, gravity={_numbers(model.opt.gravity)})",
+    ]
+    frames: dict[int, tuple[Float, Float]] = {-1: (np.zeros(3), np.eye(3))}
+    names: list[str] = []
+    for place, joint in enumerate(joints):
+        body = int(model.jnt_bodyid[joint])
+        turned = data.xmat[body].reshape(3, 3)
+        frames[place] = data.xanchor[joint].copy(), turned
+        before = max((k for k in range(place) if _is_under(model, joint, joints[k])), default=-1, key=lambda k: (
+            int(model.jnt_bodyid[joints[k]]), joints[k]))  # fmt: skip
+        at, base = frames[before]
+        name = printable(model.joint(joint).name or f"joint{place + 1}")
+        given = {"axis": _numbers(turned.T @ data.xaxis[joint])}
+        origin = _numbers(base.T @ (frames[place][0] - at))
+        given |= {"origin": origin} if origin != "(0, 0, 0)" else {}
+        rpy = _rpy(base.T @ turned)
+        given |= {"rpy": rpy} if rpy != "(0, 0, 0)" else {}
+        if before != place - 1:
+            given["parent"] = repr(names[before] if before >= 0 else "base")
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+            given["prismatic"] = "True"
+        if model.dof_armature[model.jnt_dofadr[joint]] > 0:
+            given["rotor"] = _number(float(model.dof_armature[model.jnt_dofadr[joint]]))
+        own = [k for k in range(1, model.nbody) if carrier[k] == place]
+        given["inertial"] = _numbers(_inertial(model, data, own, *frames[place]))
+        names.append(name)
+        last = given.pop("inertial")
+        first = ", ".join([json.dumps(name), *(f"{key}={value}" for key, value in given.items())])
+        lines += [f"model.joint({first},", f"            inertial={last})"]
+    return "\n".join([*lines, ""])
+
+
+def _read(path: Path) -> tuple[Any, Any]:
+    """MuJoCo and its model of a file; what is only drawn is not needed of URDF."""
+    try:
+        import mujoco
+    except ImportError:
+        raise lacking(f"{path}: reading URDF and MJCF", "mujoco") from None
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        tree = ElementTree.fromstring(text)
+        if tree.tag == "robot":
+            for link in tree.iter("link"):
+                for one in [*link.findall("visual"), *link.findall("collision")]:
+                    link.remove(one)
+            lost = [one.get("name", "") for one in tree.iter("link") if one.find("inertial") is None]
+            moved = {one.find("child").get("link", "") for one in tree.iter("joint")  # type: ignore[union-attr]
+                     if one.get("type") != "fixed" and one.find("child") is not None}  # fmt: skip
+            if bare := [one for one in lost if one in moved]:
+                raise PvidError(f"{path}: {listed(map(printable, bare))} moves and has no inertial: add it to the file")
+            return mujoco, mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
+        return mujoco, mujoco.MjModel.from_xml_path(str(path))
+    except OSError as error:
+        raise PvidError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ElementTree.ParseError, UnicodeDecodeError) as error:
+        raise PvidError(f"{path}: is no URDF or MJCF file: {reason(error)}") from None
+    except ValueError as error:
+        raise PvidError(f"{path}: MuJoCo does not read it: {printable(reason(error))}") from None
+
+
+def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[int]:
+    """Numbers of the joints, those of a body before those that it carries."""
+    names = [model.joint(one).name for one in range(model.njnt)]
+    for one in range(model.njnt):
+        if model.jnt_type[one] == mujoco.mjtJoint.mjJNT_FREE:
+            raise PvidError(f"{path}: its base floats (a free joint): only robots on a fixed base are identified")
+        if model.jnt_type[one] == mujoco.mjtJoint.mjJNT_BALL:
+            raise PvidError(f"{path}: {printable(names[one])} is a ball joint: only joints of one axis are identified")
+    for name in chosen:
+        if name not in names:
+            raise PvidError(
+                f"{path}: there is no joint {printable(name)}: it has {listed(map(printable, names or ['none']))}"
+            )
+    joints = [names.index(one) for one in chosen] if chosen else list(range(model.njnt))
+    if not joints:
+        raise PvidError(f"{path}: no joint moves")
+    for place, joint in enumerate(joints):
+        if any(_is_under(model, one, joint) for one in joints[:place]):
+            raise PvidError(f"{path}: {printable(names[joint])} carries a joint before it in the list: name it first")
+    if len(joints) > MOST_JOINTS:
+        raise PvidError(f"{path}: {len(joints)} joints are more than {MOST_JOINTS}: choose some with --joints")
+    for one in joints:
+        if model.jnt_stiffness[one] > 0:
+            raise PvidError(
+                f"{path}: {printable(names[one])} has a spring (stiffness), which no base parameter describes"
+            )
+    return joints
+
+
+def _is_under(model: Any, joint: int, other: int) -> bool:
+    """Whether a joint is carried by another one."""
+    body, above = int(model.jnt_bodyid[joint]), int(model.jnt_bodyid[other])
+    if body == above:
+        return joint > other
+    while body > 0:
+        body = int(model.body_parentid[body])
+        if body == above:
+            return True
+    return False
+
+
+def _carriers(model: Any, joints: Sequence[int]) -> list[int]:
+    """Of each body the place of the joint that moves it; -1: it rests."""
+    out = [-1] * model.nbody
+    for body in range(1, model.nbody):
+        own = [place for place, joint in enumerate(joints) if model.jnt_bodyid[joint] == body]
+        out[body] = max(own, key=lambda place: joints[place]) if own else out[int(model.body_parentid[body])]
+    return out
+
+
+def _refuse_loops(mujoco: Any, model: Any, carrier: Sequence[int], path: Path) -> None:
+    kinds = mujoco.mjtEq
+    for k in range(model.neq):
+        kind, one, other = model.eq_type[k], int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        bodies = [one, other]
+        if kind == kinds.mjEQ_JOINT:
+            bodies = [int(model.jnt_bodyid[at]) for at in bodies if at >= 0]
+        elif kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or model.eq_objtype[k] != mujoco.mjtObj.mjOBJ_BODY:
+            bodies = [0, model.nbody - 1]
+        if len({carrier[at] for at in bodies} | ({-2} if len(bodies) < 2 else set())) > 1:
+            raise PvidError(
+                f"{path}: an equality ties its bodies (a closed loop, or coupled joints): only trees of free joints "
+                "are identified; hold coupled ones with --joints"
+            )
+
+
+def _inertial(model: Any, data: Any, bodies: Sequence[int], at: Float, turned: Float) -> Float:
+    """Mass, first moments and inertia of bodies about a frame [10]."""
+    mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
+    for body in bodies:
+        m = float(model.body_mass[body])
+        centre = turned.T @ (data.xipos[body] - at)
+        axes = turned.T @ data.ximat[body].reshape(3, 3)
+        mass, first = mass + m, first + m * centre
+        spread = centre @ centre * np.eye(3) - np.outer(centre, centre)
+        second += axes @ np.diag(model.body_inertia[body]) @ axes.T + m * spread
+    return np.array([mass, *first, *second[np.triu_indices(3)]])
+
+
+def _rpy(turned: Float) -> str:
+    """Roll, pitch and yaw."""
+    level = math.hypot(turned[0, 0], turned[1, 0])
+    pitch = math.atan2(-turned[2, 0], level)
+    if level > _LOCKED:
+        roll, yaw = math.atan2(turned[2, 1], turned[2, 2]), math.atan2(turned[1, 0], turned[0, 0])
+    else:
+        roll, yaw = 0.0, math.atan2(-turned[0, 1], turned[1, 1])
+    return f"({', '.join(_angle(one) for one in (roll, pitch, yaw))})"
+
+
+def _angle(value: float) -> str:
+    """In parts of pi where it is a twelfth."""
+    part = round(12 * value / math.pi)
+    if abs(12 * value / math.pi - part) > _TWELFTHS or part == 0:
+        return _number(value)
+    shared = math.gcd(part, 12)
+    above, below = part // shared, 12 // shared
+    return (
+        f"{'-' if above < 0 else ''}{'' if abs(above) == 1 else f'{abs(above)}*'}pi{'' if below == 1 else f'/{below}'}"
+    )
+
+
+def _number(value: float) -> str:
+    rounded = round(float(value), _ROUNDED)
+    return repr(int(rounded)) if rounded == int(rounded) else repr(rounded)
+
+
+def _numbers(values: Sequence[float] | Float) -> str:
+    return f"({', '.join(map(_number, values))})"

@@ -1,0 +1,423 @@
+"""Base parameters of a robot from a run, by the weak form of pvid.model.chain.
+
+A row is -sum chi' p_i - sum chi g_i + sum chi friction = sum chi tau_i over a window, of each joint i and test function
+chi: linear in the base parameters, without accelerations. Rows of a joint have the covariance sum_m s_im gram(m, m),
+m = 0, 1, 2: white noise of the torque, of the momentum and of its integral, as large as the residuals show.
+
+Dry friction near a reversal is no sgn: it sticks, is soft, or follows a Stribeck curve. What it does there in a short
+time about t_r has the directions chi(t_r), chi'(t_r) and chi''(t_r) in the rows of its joint, which are projected out.
+
+Noise of the encoders is in the regressors as well, in the rates even squared. What that adds to the normal equations
+S p = F is computed from the run: as much noise is added again, and subtracted, and the mean growth of S and F is taken
+off (simulation extrapolation: J. Cook, L. Stefanski, JASA 89 (1994) 1314).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.model.chain import Chain, friction
+from pvid.model.compiled import CompiledModel
+from pvid.model.operations import evaluated
+from pvid.oracle.weak.filters import polynomial_weights
+from pvid.oracle.weak.front import filtered, of_hold, samples_of, segments_of
+from pvid.oracle.weak.functions import Float, TestFunctions
+from pvid.oracle.weak.solve import inverse, solved
+
+_DEGREE, _SHORTEST, _LONGEST = 4, 7, 61  # of the polynomials that give positions and rates
+_BLURRED = 1.2  # of the noise of a rate: what a longer polynomial may change
+_SHORTEST_S, _LONGEST_S, _WINDOWS = 0.5, 1.0, 15  # of a window, and how many the run has of them end to end
+_POWER, _FEWEST, _MOST = 4, 21, 49  # of the test functions
+_MOTION = 0.999  # of the energy of the rates: the test functions reach twice the frequency below which it is
+_CLEAR = 10.0  # times the power of the noise
+_LEAST_HZ = 100.0
+_STEPS = 2000  # at a time
+_TURNS, _DRAWS = 4, 4
+_COVERED = 0.1  # of the torques: what a standard error may be worth
+_FEWEST_WINDOWS = 8
+_SLOW = 0.05  # of the root mean square of a rate: below it the sign of friction is in doubt
+_ORDERS, _REVERSALS = 3, 4  # directions of a reversal; most of them in a window that counts
+_RIDGE = 1e-9  # of the variances, as rows depend on each other
+_DIRECTION = 1e-6  # relative size of a direction that is one
+
+
+@dataclass(frozen=True)
+class RobotDesign:
+    """Of the windows of a run.
+
+    Attributes
+    ----------
+    sample_rate : [Hz]
+    taps : samples of the polynomials
+    functions : test functions
+    sd : white noise of each encoder's samples [n]
+    """
+
+    sample_rate: float
+    taps: int
+    functions: TestFunctions
+    sd: Float
+
+
+class RobotRun:
+    """Positions and torques [n, samples] of each segment of a run."""
+
+    def __init__(self, model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> None:
+        assert model.chain is not None
+        self.model, self.chain, self.sample_rate = model, model.chain, sample_rate
+        samples = samples_of(model, run)
+        constants = {one.name: one.value for one in model.knowns}
+        self.positions: list[Float] = []
+        self.torques: list[Float] = []
+        for part in segments_of(samples):
+            positions, torques = [], []
+            for k in range(1, len(self.chain.joints) + 1):
+                name = f"tau{k}" if f"tau{k}" in samples else f"i{k}"
+                held = model.signal(name).hold == "zoh"
+                torque = samples[name][part] * constants.get(f"kt{k}", 1.0)
+                positions.append(samples[f"q{k}"][part])
+                torques.append(of_hold(torque) if held else torque)
+            self.positions.append(np.array(positions))
+            self.torques.append(np.array(torques))
+
+    @cached_property
+    def design(self) -> RobotDesign:
+        """The longest polynomials that blur nothing visible, and windows for the band of the motion."""
+        rate = self.sample_rate
+        parts = [one for one in self.positions if one.shape[1] > 2 * _LONGEST]
+        if not parts:
+            raise PvidError(f"the run has no {2 * _LONGEST} samples without a gap: record longer")
+        whole = max(parts, key=lambda one: one.shape[1])
+        inner = slice(_LONGEST, -_LONGEST)
+        short = polynomial_weights(_SHORTEST, _DEGREE, 0)
+        left = whole - self.smoothed(whole, _SHORTEST, 0)
+        sd = np.sqrt(np.mean(left[:, inner] ** 2, axis=1) / (1 - short[_SHORTEST // 2]))
+        rates, taps = self.smoothed(whole, _SHORTEST, 1)[:, inner], _SHORTEST
+        for longer in range(_SHORTEST + 2, _LONGEST + 1, 2):
+            apart = self.smoothed(whole, longer, 1)[:, inner] - rates
+            weights = polynomial_weights(longer, _DEGREE, 1).copy()
+            weights[(longer - _SHORTEST) // 2 : (longer + _SHORTEST) // 2] -= polynomial_weights(_SHORTEST, _DEGREE, 1)
+            if np.any(np.mean(apart**2, axis=1) > _BLURRED * (sd * rate) ** 2 * np.sum(weights**2)):
+                break
+            taps = longer
+        smooth = self.smoothed(whole, taps, 1)[:, inner]
+        power = np.abs(np.fft.rfft(smooth - smooth.mean(axis=1, keepdims=True))) ** 2
+        gain = np.abs(np.fft.rfft(polynomial_weights(taps, _DEGREE, 1) * rate, smooth.shape[1])) ** 2
+        noise = np.outer(sd**2 * smooth.shape[1], gain)
+        power = np.sum(np.where(power > _CLEAR * noise, power, 0.0), axis=0)
+        below = int(np.searchsorted(np.cumsum(power), _MOTION * power.sum()))
+        highest = 2 * below * rate / smooth.shape[1]
+        samples = sum(one.shape[1] for one in self.positions)
+        hop = int(min(max(samples / rate / _WINDOWS, _SHORTEST_S), _LONGEST_S) * rate / 2)
+        wanted = 2 * int(np.ceil(highest * 2 * hop / rate)) + 1
+        count = min(max(wanted, _FEWEST), _MOST, 2 * (hop // 2 - _POWER) - 1)
+        if rate < _LEAST_HZ:
+            raise PvidError(f"{rate:g} samples a second are too few for a robot: record at {_LEAST_HZ:g} Hz or more")
+        return RobotDesign(rate, taps, TestFunctions(count, _POWER, hop, 1 / rate), sd)
+
+    def smoothed(self, q: Float, taps: int, order: int) -> Float:
+        """Positions or rates [n, samples]; wrong within half of the ends."""
+        weights = polynomial_weights(taps, _DEGREE, order) * self.sample_rate**order
+        return np.array([filtered(one, weights) for one in q])
+
+    def values(self, columns: Sequence[int], size: int, seed: int | None = None, sign: int = 1) -> Iterator[Segment]:
+        """Columns of the torques at the steps of each segment, so many at a time.
+
+        Parameters
+        ----------
+        seed, sign : of as much noise of the encoders again; None: none is added
+        """
+        taps = self.design.taps
+        random = np.random.default_rng(seed)
+        for q, torque in zip(self.positions, self.torques, strict=True):
+            if seed is not None:
+                q = q + sign * self.design.sd[:, np.newaxis] * random.normal(size=q.shape)
+            steps = slice(taps // 2, q.shape[1] - taps // 2)
+            if steps.stop - steps.start < 2 * self.design.functions.hop:
+                continue
+            position, rate = (self.smoothed(q, taps, order)[:, steps] for order in (0, 1))
+            yield Segment(self.chain, columns, position, rate, torque[:, steps], size)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Steps of a segment: positions, rates and torques [n, steps]; `size` of them are computed at a time."""
+
+    chain: Chain
+    columns: Sequence[int]
+    position: Float
+    rate: Float
+    torque: Float
+    size: int
+
+    @cached_property
+    def entries(self) -> list[tuple[int, int, int]]:
+        """(order of the derivative, joint, place in the columns) of each value."""
+        others = [(0, joint, place) for place, joint, _ in friction(self.chain, self.columns)]
+        return [*self.chain.program(self.columns)[1], *others]
+
+    def pieces(self) -> Iterator[Float]:
+        """Values [entries, steps] of one piece after the other."""
+        program = self.chain.program(self.columns)[0]
+        others = list(friction(self.chain, self.columns))
+        steps = self.position.shape[1]
+        for first in range(0, steps, self.size):
+            own = slice(first, min(first + self.size, steps))
+            rate = self.rate[:, own]
+            found = evaluated(program, [*self.position[:, own], *rate])
+            found += [column(rate[joint]) for _, joint, column in others]
+            yield np.array([np.broadcast_to(one, rate.shape[1:]) for one in found])
+
+
+def _doubts(rate: Float, functions: TestFunctions) -> Float:
+    """Directions of the reversals of a joint in its windows [windows, K, directions], from its rates [steps]; all K
+    where there are too many, or one takes longer than the test functions resolve."""
+    hop, k = functions.hop, functions.count
+    windows = len(rate) // hop - 1
+    slow = np.abs(rate) < _SLOW * np.sqrt(np.mean(rate**2))
+    slow[1:] |= rate[1:] * rate[:-1] <= 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(np.int8), [0]])))
+    begins, ends = edges[::2], edges[1::2]
+    apart = begins[1:] - ends[:-1] > hop / functions.highest  # others are one for the test functions
+    begins, ends = begins[np.append(True, apart)[: len(begins)]], ends[np.append(apart, True)[: len(ends)]]
+    times = np.array([a + np.argmin(np.abs(rate[a:b])) for a, b in zip(begins, ends, strict=True)], np.int64)
+    long = ends - begins > 2 * hop / functions.highest
+    out = np.zeros((windows, k, max(k, _ORDERS * _REVERSALS)))
+    for window in range(windows):
+        inside = (ends > window * hop) & (begins < (window + 2) * hop)
+        own = times[inside] - window * hop
+        if len(own) > _REVERSALS or long[inside].any():
+            out[window, :, :k] = np.eye(k)
+            continue
+        turns = np.exp(1j * np.outer(own * functions.dt, functions.rates))
+        for order in range(_ORDERS):
+            chi = np.real(turns @ (functions.coefficients * ((1j * functions.rates) ** order)[:, np.newaxis]))
+            out[window, :, order : _ORDERS * len(own) : _ORDERS] = chi.T
+    return out
+
+
+@dataclass(frozen=True)
+class RobotRows:
+    """Rows of all windows.
+
+    Attributes
+    ----------
+    regressors, known : of each joint [n, windows, p, K] and its torque [n, windows, K]
+    doubts : directions that do not count [n, windows, K, ..]
+    next : of each window but the last, whether the one behind it overlaps it [windows - 1]
+    free : part of the rows that counts, of each joint [n]
+    """
+
+    regressors: Float
+    known: Float
+    doubts: Float
+    next: npt.NDArray[np.bool_]
+    free: Float
+
+    @classmethod
+    def of(cls, run: RobotRun, columns: Sequence[int], seed: int | None = None, sign: int = 1) -> RobotRows:
+        """Of a run; see RobotRun.values."""
+        functions = run.design.functions
+        hop, n = functions.hop, len(run.chain.joints)
+        tables = [functions.combine(0), -functions.combine(1)]
+        parts, known, doubts, follows = [], [], [], []
+        for segment in run.values(columns, max(_STEPS // hop, 1) * hop, seed, sign):
+            halves = [functions.half_sums(functions.halves(one)) for one in segment.pieces()]
+            whole = np.concatenate(halves, axis=1)
+            sums = functions.joined(whole[:, :-1], whole[:, 1:])
+            own = np.zeros((n, sums.shape[1], len(columns), functions.count))
+            for (order, joint, place), one in zip(segment.entries, sums, strict=True):
+                own[joint, :, place] += one @ tables[order]
+            parts.append(own)
+            known.append(functions.window_sums(segment.torque) @ tables[0])
+            doubts.append(np.array([_doubts(one, functions) for one in segment.rate]))
+            follows += [*([True] * (sums.shape[1] - 1)), False]
+        if sum(one.shape[1] for one in parts) < _FEWEST_WINDOWS:
+            raise PvidError(
+                f"the run has fewer than {_FEWEST_WINDOWS} windows of {functions.length:.3g} s: record longer"
+            )
+        x, y, away = (np.concatenate(one, axis=1) for one in (parts, known, doubts))
+        return cls(x, y, away, np.array(follows[:-1], np.bool_), np.ones(n))
+
+    @property
+    def windows(self) -> int:
+        """Of the run."""
+        return len(self.known[0])
+
+    def white(self, roots: Float) -> RobotRows:
+        """With unit covariance, from R_i^(-1/2) [n, K, K], but for what is in doubt, which is gone."""
+        doubts = np.einsum("iwkd,ijk->iwjd", self.doubts, roots, optimize=True)
+        size = np.linalg.norm(doubts, axis=2, keepdims=True)
+        doubts = np.divide(doubts, size, out=np.zeros(doubts.shape), where=size > 0)
+        left = np.eye(doubts.shape[2]) - doubts @ np.linalg.pinv(doubts, rcond=_DIRECTION)
+        roots = left @ roots[:, np.newaxis]
+        x = np.einsum("iwpk,iwjk->iwpj", self.regressors, roots, optimize=True)
+        y = np.einsum("iwk,iwjk->iwj", self.known, roots)
+        free = np.trace(left, axis1=2, axis2=3).mean(axis=1) / doubts.shape[2]
+        return RobotRows(x, y, self.doubts, self.next, free)
+
+    def moments(self, windows: slice = slice(None)) -> tuple[Float, Float]:
+        """S [p, p] and, of each joint, its part of F [n, p]."""
+        x = self.regressors[:, windows].transpose(2, 0, 1, 3)
+        flat = x.reshape(len(x), -1)
+        return flat @ flat.T, np.einsum("piwk,iwk->ip", x, self.known[:, windows], optimize=True)
+
+    def residuals(self, p: Float) -> Float:
+        """[n, windows, K]."""
+        return np.asarray(self.known - np.einsum("iwpk,p->iwk", self.regressors, p))
+
+
+@dataclass(frozen=True)
+class RobotFit:
+    """An estimate.
+
+    Attributes
+    ----------
+    run, design : what it is from
+    columns : places of the parameters among the standard ones
+    p, covariance : base parameters, and of their noise [p], [p, p]
+    by_gain : what p is off by if the torque of a joint is recorded (1 + g) times as large as it is, over g [n, p]
+    uncorrected : p with the noise of the encoders in the regressors [p]
+    halves : of the first and of the second half of the windows [2, p]
+    apart : their difference over its standard error [p]
+    undetermined : a standard error is worth more than a tenth of the torques [p]
+    windows : of the run
+    """
+
+    run: RobotRun
+    columns: tuple[int, ...]
+    p: Float
+    covariance: Float
+    by_gain: Float
+    uncorrected: Float
+    halves: Float
+    apart: Float
+    undetermined: npt.NDArray[np.bool_]
+    windows: int
+
+    @property
+    def design(self) -> RobotDesign:
+        """Of the windows."""
+        return self.run.design
+
+    def predicted(self, run: RobotRun, p: Float) -> Iterator[tuple[Float, Float]]:
+        """Torques of each segment of a run, measured and as each of several p [.., p] gives them: [n, steps] and
+        [n, .., steps]."""
+        n, taps = len(run.chain.joints), 2 * self.design.taps + 1
+        weights = polynomial_weights(taps, _DEGREE, 1) * run.sample_rate
+        for segment in run.values(self.columns, _STEPS):
+            whole = np.zeros((2, n, len(p), segment.position.shape[1]))
+            first = 0
+            for values in segment.pieces():
+                own = slice(first, first + values.shape[1])
+                for (order, joint, place), one in zip(segment.entries, values, strict=True):
+                    whole[order, joint, :, own] += p[:, place, np.newaxis] * one
+                first = own.stop
+            inner = slice(taps // 2, whole.shape[-1] - taps // 2)
+            slopes = np.apply_along_axis(filtered, -1, whole[1], weights)
+            yield segment.torque[:, inner], (whole[0] + slopes)[..., inner]
+
+
+@np.errstate(invalid="ignore")  # what the noise of the encoders covers has no standard error
+def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> RobotFit:
+    """Base parameters from a run: name of each signal -> samples [n], in the model's units.
+
+    Raises
+    ------
+    PvidError
+        When the run is too short.
+    """
+    whole = RobotRun(model, run, sample_rate)
+    columns = tuple(one.standard for one in whole.chain.base)
+    rows = RobotRows.of(whole, columns)
+    functions = whole.design.functions
+    for k, one in enumerate(rows.white(np.array([np.eye(functions.count)] * len(rows.known))).free):
+        if one <= 0:
+            raise PvidError(
+                f"q{k + 1} is nowhere clear of a standstill for a window of {functions.length:.3g} s: move this joint "
+                "faster, or for longer in one direction"
+            )
+    grams = np.array([functions.gram(m, m) for m in range(3)])
+    traces = np.trace(grams, axis1=1, axis2=2)[:, np.newaxis, np.newaxis]
+    grams /= traces
+    parts = np.array([[np.mean(one**2), 0.0, 0.0] for one in rows.known])
+    for _ in range(_TURNS):
+        roots = np.array([_root(one, grams) for one in parts])
+        white = rows.white(roots)
+        s, f = white.moments()
+        free = white.free - np.array(
+            [np.sum(inverse(s) * np.einsum("wpk,wqk->pq", one, one, optimize=True)) for one in white.regressors]
+        ) / (rows.windows * functions.count)
+        left = white.residuals(solved(s, f.sum(axis=0)))
+        parts = np.array(
+            [_fitted(one.T @ one / (rows.windows * part), grams, root)
+             for one, part, root in zip(left, free, roots, strict=True)]
+        )  # fmt: skip
+    uncorrected = solved(s, f.sum(axis=0))
+    more_s, more_f = np.zeros(s.shape), np.zeros(f.shape)
+    for seed in range(_DRAWS):
+        for sign in (1, -1):
+            again = RobotRows.of(whole, columns, seed, sign).white(roots).moments()
+            more_s += (again[0] - s) / (2 * _DRAWS)
+            more_f += (again[1] - f) / (2 * _DRAWS)
+    corrected = s - more_s
+    p = solved(corrected, (f - more_f).sum(axis=0))
+    bread = inverse(corrected)
+    e = white.residuals(p) / np.sqrt(free)[:, np.newaxis, np.newaxis]
+    n, count = len(roots), functions.count
+    overlaps = np.array([functions.overlap(m, m) for m in range(3)]) / traces
+    later = np.zeros((n, count, n, count))
+    for k, (part, root) in enumerate(zip(parts, roots, strict=True)):
+        later[k, :, k] = root @ np.tensordot(part, overlaps, 1) @ root.T
+    flat = e.transpose(1, 0, 2).reshape(rows.windows, n * count)
+    first, second = flat[:-1][white.next], flat[1:][white.next]
+    seen = _scatter(white, flat.T @ flat / len(flat), first.T @ second / max(len(first), 1))
+    covariance = bread @ seen @ bread
+    wanted = np.diag(bread @ _scatter(white, np.eye(n * count), later.reshape(n * count, -1)) @ bread)
+    wider = np.sqrt(np.maximum(wanted / np.diag(covariance), 1.0))
+    covariance = covariance * np.outer(wider, wider)
+    by_gain = (f - more_f) @ bread
+    size = np.sqrt(np.diag(covariance) * np.diag(s))
+    undetermined = ~(size < _COVERED * np.sqrt(np.sum(white.known**2)))
+    middle = rows.windows // 2
+    halves, variances = [], []
+    for part in (slice(0, middle), slice(middle, None)):
+        own_s, own_f = white.moments(part)
+        share = (middle if part.stop else rows.windows - middle) / rows.windows
+        own_s = own_s - share * more_s
+        halves.append(solved(own_s, (own_f - share * more_f).sum(axis=0)))
+        variances.append(np.diag(inverse(own_s)) * np.diag(covariance) / np.diag(bread))
+    apart = np.abs(halves[0] - halves[1]) / np.sqrt(np.sum(variances, axis=0))
+    return RobotFit(
+        whole, columns, p, covariance, by_gain, uncorrected, np.array(halves), apart, undetermined, rows.windows
+    )
+
+
+def _root(parts: Float, grams: Float) -> Float:
+    """R^(-1/2) of R = sum_m s_m gram_m [K, K]."""
+    whole = np.tensordot(parts, grams, 1)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(whole + _RIDGE * np.diag(np.diag(whole)))))
+
+
+def _fitted(scatter: Float, grams: Float, root: Float) -> Float:
+    """s_m >= 0 with sum_m s_m gram_m closest to the scatter of whitened residuals [K, K]."""
+    from scipy.optimize import nnls  # a quarter of a second
+
+    sides = np.array([one.reshape(-1) for one in (scatter, *(root @ one @ root.T for one in grams))])
+    sizes = np.linalg.norm(sides[1:], axis=1)
+    return np.asarray(nnls((sides[1:] / sizes[:, np.newaxis]).T, sides[0])[0] / sizes)
+
+
+def _scatter(white: RobotRows, own: Float, later: Float) -> Float:
+    """Covariance of the score sum X^T e [p, p], from those of the residuals of all joints in a window, and with those
+    in the next, which all windows have in common [n K, n K]."""
+    x = white.regressors.transpose(1, 2, 0, 3).reshape(white.windows, white.regressors.shape[2], len(own))
+    total = np.einsum("wpk,wqk->pq", x @ own, x, optimize=True)
+    neighbours = np.einsum("wpk,wqk->pq", x[:-1][white.next] @ later, x[1:][white.next], optimize=True)
+    return np.asarray(total + neighbours + neighbours.T)

@@ -1,0 +1,145 @@
+"""Model files from URDF and MJCF, against MuJoCo's own torques."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import robot_arms
+from click.testing import CliRunner
+
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.model.chain import Chain
+from pvid.models.mechanisms import compiled_of
+from pvid.models.robot_file import model_text
+
+MJCF = """
+<mujoco model="arm"><compiler angle="radian"/><option gravity="0 0.5 -9.81"/>
+<worldbody><body pos="0 0 0.2" quat="0.8 0 0.6 0"><inertial pos="0.1 0 0" mass="9" diaginertia="1 1 1"/>
+  <body pos="0.1 0 0.3" quat="0.9 0.1 -0.3 0.2">
+    <joint name="turn" axis="0 0 1" pos="0.02 0.01 0" armature="0.03"/>
+    <joint name="tilt" axis="0 0.6 0.8"/>
+    <inertial pos="0.1 0.02 0.03" mass="2" fullinertia="0.03 0.04 0.05 0.001 0.002 0.003"/>
+    <body pos="0.4 0 0" quat="0.7 0.1 0.7 0">
+      <joint name="slide" type="slide" axis="1 0 0"/>
+      <inertial pos="0 0.1 0" mass="1.5" fullinertia="0.02 0.01 0.02 0.001 0 0.002"/>
+      <body pos="0.1 0 0"><inertial pos="0.05 0 0.05" mass="0.5" diaginertia="0.001 0.002 0.002"/></body>
+    </body>
+    <body pos="-0.2 0 0.1"><joint name="other" axis="1 0 0"/>
+      <inertial pos="0 0 0.2" mass="1" fullinertia="0.03 0.03 0.01 0 0 0.001"/>
+    </body>
+  </body>
+</body></worldbody>{more}</mujoco>"""
+URDF = (Path(__file__).parents[1] / "data/robot/arm.urdf").read_text(encoding="utf-8")
+LOWER = next(one for one in re.findall(r"(?s)<inertial>.*?</inertial>", URDF) if 'mass value="1"' in one)
+FREE = '<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
+BALL = '<mujoco><worldbody><body><joint name="b" type="ball"/><geom size="0.1"/></body></worldbody></mujoco>'
+STILL = '<mujoco><worldbody><body><geom size="0.1"/></body></worldbody></mujoco>'
+SPRING = '<mujoco><worldbody><body><joint name="s" stiffness="2"/><geom size="0.1"/></body></worldbody></mujoco>'
+ONE = '<body><joint/><geom size="0.1"/>'
+MANY = f"<mujoco><worldbody>{ONE * 13}{'</body>' * 13}</worldbody></mujoco>"
+COUPLED = '<equality><joint joint1="slide" joint2="other"/></equality>'
+LOOP = '<equality><connect body1="{}" body2="{}" anchor="0 0 0"/></equality>'
+
+
+def chain_of(folder: Path, text: str, *joints: str) -> Chain:
+    """What a robot's file becomes, by way of a model file."""
+    (folder / "robot.xml").write_text(text)
+    (folder / "robot.py").write_text(model_text(folder / "robot.xml", joints))
+    chain = compiled_of(folder / "robot.py").chain
+    assert chain is not None
+    return chain
+
+
+@pytest.mark.parametrize("text", [MJCF.format(more=""), URDF], ids=["MJCF", "URDF"])
+def test_a_model_file_has_the_torques_of_mujoco(text: str, tmp_path: Path) -> None:
+    chain = chain_of(tmp_path, text)
+    plain = re.sub("<visual>.*?</visual>", "", text)
+    model = mujoco.MjModel.from_xml_string(plain)
+    data, states = mujoco.MjData(model), np.random.default_rng(2).uniform(-1, 1, (3, model.nv, 10))
+    found = robot_arms.torques(chain, *states)
+    for k, (q, v, a) in enumerate(states.transpose(2, 0, 1)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
+        mujoco.mj_inverse(model, data)
+        np.testing.assert_allclose(found[:, k], data.qfrc_inverse, atol=1e-7)  # a file has ten digits
+
+
+def test_joints_that_are_not_chosen_are_held(tmp_path: Path) -> None:
+    chain = chain_of(tmp_path, MJCF.format(more=""), "turn", "other")
+    assert [(one.name, one.parent) for one in chain.joints] == [("turn", -1), ("other", 0)]
+    mass = chain.joints[0].inertial
+    assert mass is not None and mass[0] == pytest.approx(4.0)  # what slides is carried
+
+
+def test_the_model_file_is_short(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(URDF)
+    text = model_text(tmp_path / "arm.urdf")
+    assert "rpy=(-pi/2, 0, 0)," in text and 'model.joint("shoulder",' in text
+    assert len(text.splitlines()) < 12 and max(map(len, text.splitlines())) <= 200
+
+
+REFUSED = {
+    "no file": (None, (), "cannot be read"),
+    "no XML": ("t,q1\n0,1\n", (), "is no URDF or MJCF file"),
+    "unknown": ("<mujoco><worldbody><thing/></worldbody></mujoco>", (), "MuJoCo does not read it"),
+    "floating": (FREE, (), "its base floats (a free joint)"),
+    "ball": (BALL, (), "b is a ball joint"),
+    "no joint": (STILL, (), "no joint moves"),
+    "spring": (SPRING, (), "s has a spring (stiffness)"),
+    "many": (MANY, (), "13 joints are more than 12: choose some with --joints"),
+    "no inertial": (URDF.replace(LOWER, ""), (), "lower moves and has no inertial"),
+    "no such joint": (MJCF.format(more=""), ("knee",), "there is no joint knee: it has turn, tilt, slide and other"),
+    "order": (MJCF.format(more=""), ("slide", "turn"), "turn carries a joint before it in the list"),
+    "loop": (
+        MJCF.replace('body pos="-0.2', 'body name="a" pos="-0.2').replace('body pos="0.4', 'body name="b" pos="0.4')
+        .format(more=LOOP.format("a", "b")), (), "an equality ties its bodies (a closed loop, or coupled joints)",
+    ),
+    "coupled": (
+        MJCF.format(more=COUPLED), (), "an equality ties its bodies",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_arm_is_refused(name: str, tmp_path: Path) -> None:
+    text, joints, sentence = REFUSED[name]
+    path = tmp_path / "arm.xml"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(PvidError, match=re.escape(sentence)):
+        model_text(path, joints)
+
+
+def test_coupled_joints_may_be_held(tmp_path: Path) -> None:
+    assert len(chain_of(tmp_path, MJCF.format(more=COUPLED), "turn", "tilt").joints) == 2
+
+
+def test_without_mujoco_the_line_that_installs_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
+    with pytest.raises(PvidError, match="needs the Python package mujoco"):
+        model_text(tmp_path / "arm.urdf")
+
+
+def test_from_a_file_to_an_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.urdf").write_text(URDF)
+
+    def run(*arguments: str) -> str:
+        found = CliRunner().invoke(commands, arguments, standalone_mode=False)
+        assert found.exception is None and found.return_value == 0, found.exception or found.output
+        return found.output
+
+    assert "arm.py: 2 joints, " in run("model", "from", "arm.urdf", "-o", "arm.py")
+    chain = compiled_of(Path("arm.py")).chain
+    assert chain is not None
+    log = robot_arms.log_of(chain, 1)
+    np.savetxt("log.csv", np.array(list(log.values())).T, delimiter=",", header=",".join(log), comments="")
+    report = run("model", "check", "arm.py")
+    assert "2 joints" in report and "No torque depends on" in report
+    answer = run("identify", "log.csv", "--model", "arm.py", "--validate", "log.csv")
+    assert "predicts torques that were not fitted: tau1" in answer and "log.csv: the answer predicts tau1" in answer
+    assert re.search(r"Fc2 \[N\*m\] +│ +(1.0\d*|0.99\d*) ", answer), answer

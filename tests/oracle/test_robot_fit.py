@@ -1,0 +1,110 @@
+"""Base parameters from recordings of arms whose torques are those of Newton and Euler."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import robot_arms
+
+from pvid.base.errors import PvidError
+from pvid.model import Robot
+from pvid.model.chain import Chain
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.robot import RobotFit, RobotRun, identify_robot
+
+RATE = 500.0
+SPATIAL = robot_arms.arm("spatial", seed=5)
+
+
+def model_of(chain: Chain) -> CompiledModel:
+    robot = Robot("arm", chain.gravity)
+    robot.joints = list(chain.joints)
+    for k in range(1, len(chain.joints) + 1):
+        robot.sensor(f"q{k}", "rad", resolution=1e-4)
+        robot.input(f"tau{k}", "N*m", hold="sampled")
+    return robot.compiled()
+
+
+def truth_of(chain: Chain) -> Any:
+    friction = {"Fv": 0.5, "Fc": 1.0}
+    return np.array([friction.get(chain.standard[one.standard].kind, chain.of_file(one)) for one in chain.base])
+
+
+def fits(seeds: int, **how: Any) -> list[RobotFit]:
+    return [identify_robot(model_of(SPATIAL), robot_arms.log_of(SPATIAL, seed, **how), RATE) for seed in range(seeds)]
+
+
+def off_by(found: list[RobotFit], values: str) -> Any:
+    """In standard errors [runs, p]."""
+    truth = truth_of(SPATIAL)
+    return np.array([(getattr(one, values) - truth) / np.sqrt(np.diag(one.covariance)) for one in found])
+
+
+def test_standard_errors_cover_the_truth() -> None:
+    found = fits(10)
+    off = off_by(found, "p")
+    assert not any(one.undetermined.any() for one in found)
+    # 210 values, of which the 21 of a run depend on each other: 94.3 % are within 2 and the rms is 1.03.
+    assert np.mean(np.abs(off) < 2) > 0.90 and 0.8 < np.sqrt(np.mean(off**2)) < 1.2
+    # The errors are those of a fit, not of anything: the twist of the first joint is known to 1 %.
+    assert max(np.sqrt(one.covariance[0, 0]) / abs(truth_of(SPATIAL)[0]) for one in found) < 0.01
+
+
+def test_noise_of_the_encoders_biases_and_the_bias_is_taken_off() -> None:
+    found = fits(10, bits=14, blur=1.0, noise=0.002)
+    biased, unbiased = (np.mean(off_by(found, one), axis=0) for one in ("uncorrected", "p"))
+    assert np.sqrt(np.mean(biased**2)) > 0.5  # standard errors: 0.61; the mean of ten runs has one of 0.3 by chance
+    assert np.sqrt(np.mean(unbiased**2)) < 0.4  # 0.24
+    assert np.mean(np.abs(off_by(found, "p")) < 2) > 0.90
+
+
+def test_torques_of_unseen_motion_are_predicted_to_their_noise() -> None:
+    fit = fits(1)[0]
+    other = RobotRun(fit.run.model, robot_arms.log_of(SPATIAL, 77), RATE)
+    for measured, predicted in fit.predicted(other, np.array([fit.p, np.zeros(len(fit.p))])):
+        left = measured[:, np.newaxis] - predicted
+        r2 = 1 - left.var(axis=-1) / measured.var(axis=-1)[:, np.newaxis]
+        assert (r2[:, 0] > 0.99).all() and (abs(r2[:, 1]) < 1e-9).all()  # the noise alone leaves 0.9996
+
+
+def test_gaps_are_no_motion() -> None:
+    log = robot_arms.log_of(SPATIAL, 3)
+    log["q2"][4000:4040] = np.nan
+    whole, cut = (identify_robot(model_of(SPATIAL), one, RATE) for one in (robot_arms.log_of(SPATIAL, 3), log))
+    assert cut.windows < whole.windows
+    off = (cut.p - whole.p) / np.sqrt(np.diag(whole.covariance))
+    assert np.max(np.abs(off)) < 2  # a part of the windows is not there
+
+
+def _still(log: dict[str, Any]) -> None:
+    log["q2"] = 0.3 + 1e-4 * np.random.default_rng(0).normal(size=len(log["q2"]))
+
+
+def _short(size: int) -> Callable[[dict[str, Any]], None]:
+    return lambda log: log.update({name: one[:size] for name, one in log.items()})
+
+
+REFUSED: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "a joint is missing": (lambda log: log.pop("tau3"), "the run has no column tau3 [N*m], which robot needs"),
+    "a joint rests": (_still, "q2 is nowhere clear of a standstill for a window of 1 s: move this joint faster"),
+    "no sample": (_short(100), "the run has no 122 samples without a gap: record longer"),
+    "few windows": (_short(700), "the run has fewer than 8 windows of 0.5 s: record longer"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_recording_that_shows_nothing_is_refused(name: str) -> None:
+    change, sentence = REFUSED[name]
+    log = robot_arms.log_of(SPATIAL, 0)
+    change(log)
+    with pytest.raises(PvidError, match=re.escape(sentence)):
+        identify_robot(model_of(SPATIAL), log, RATE)
+
+
+def test_a_slow_clock_is_refused() -> None:
+    with pytest.raises(PvidError, match="50 samples a second are too few for a robot: record at 100 Hz or more"):
+        identify_robot(model_of(SPATIAL), robot_arms.log_of(SPATIAL, 0), 50.0)
