@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import os
-import re
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31
@@ -311,15 +307,3 @@ def test_an_unknown_target_is_named() -> None:
         open_target("mps2", standard_rig("weak"))
     with pytest.raises(PvidError, match="there is no port /dev/nowhere"):
         open_target("/dev/nowhere", standard_rig("weak"))
-
-
-def test_identify_and_compare_on_targets(tmp_path: Path) -> None:
-    assert pvid(tmp_path, "model", "simulate", "battery_2rc", "run.csv").returncode == 0
-    done = pvid(tmp_path, "identify", "run.csv", "--core", "q31", "--on", HOST_TARGET, "--json")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["on"] == HOST_TARGET
-    both = pvid(tmp_path, "compare", "run.csv", "--on", HOST_TARGET)
-    assert both.returncode == 0, both.stderr
-    assert both.stdout.count("equal") == 3 and "DIFFERENT" not in both.stdout
-    hashes = re.findall(r"[0-9a-f]{8}", both.stdout)
-    assert hashes[0] == hashes[2] != hashes[1]  # the weak form here and there; both stages

@@ -60,13 +60,12 @@ def test_the_weak_form_refuses_the_other_law(place: Path) -> None:
     assert "omit --law" in done.stderr
 
 
-def test_the_paper_s_law_can_be_chosen_and_has_the_bits_of_its_twin(place: Path) -> None:
-    law = ("--law", "pseudovelocity")
-    other = json.loads(pvid(place, *strong("identify", "run.csv", "--json", *law)).stdout)
-    assert (other["form"], other["identified"]) == ("strong", True)
-    done = pvid(place, *strong("compare", "run.csv", *law))
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("equal") == 1 and law[1] in done.stdout and other["hash"] in done.stdout
+def test_the_paper_s_law_can_be_chosen(place: Path) -> None:
+    usual, other = (
+        json.loads(pvid(place, *strong("identify", "run.csv", "--json", *law)).stdout)
+        for law in ((), ("--law", "pseudovelocity"))
+    )
+    assert (other["form"], other["identified"]) == ("strong", True) and other["hash"] != usual["hash"]
 
 
 def test_demo_prints_its_lines_and_draws_the_picture_of_the_readme(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -228,6 +229,7 @@ def test_the_refined_answer_in_c_is_printed_and_is_that_of_a_board(recorded: dic
     on_board = answers("rigid_body", "--core", "f32", "--refine", "--on", HOST_TARGET)
     assert on_board["on"] == HOST_TARGET and on_board["hash"] == shown["hash"]  # of both stages, at every report
     assert on_board["parameters"] == shown["parameters"]
+    assert answers("rigid_body", "--core", "q31", "--on", HOST_TARGET)["on"] == HOST_TARGET
 
 
 def test_the_options_of_a_rig_file_reach_the_second_stage_in_c_and_a_board(tmp_path: Path) -> None:
@@ -293,10 +295,12 @@ def test_where_nothing_is_refined_the_answer_is_that_of_the_weak_form_and_says_s
 def test_the_second_stage_is_compared_with_its_twin_too(
     recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    answer = pvid("compare", recorded["rigid_body"])
-    rows = [line.split() for line in answer.stdout.splitlines() if "host" in line]
+    answer = pvid("compare", recorded["rigid_body"], "--on", HOST_TARGET)
+    rows = [line.split() for line in answer.stdout.splitlines() if " host " in line]
     assert answer.return_value == DONE and [row[5] for row in rows] == ["weak", "refined"]
-    assert rows[0][11] != rows[1][11] and answer.stdout.count("equal") == 2  # hashes of one stage and of both
+    assert rows[0][11] != rows[1][11] and answer.stdout.count("equal") == 3  # hashes of one stage and of both
+    hashes = re.findall(r"\b[0-9a-f]{8}\b", answer.stdout)
+    assert hashes[0] == hashes[2] != hashes[1]  # of the weak form, here and there
     changed = "pvid.identification.core_refined.PrintedTwin"
     monkeypatch.setattr(changed, lambda sources, weak, own: PrintedTwin(sources, weak, replace(own, gate=1.0)))
     answer = pvid("compare", recorded["rigid_body"])
