@@ -11,6 +11,7 @@ import pytest
 import robot_arms
 from click.testing import CliRunner
 
+import pvid
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.model.chain import Chain
@@ -143,3 +144,19 @@ def test_from_a_file_to_an_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     answer = run("identify", "log.csv", "--model", "arm.py", "--validate", "log.csv")
     assert "predicts torques that were not fitted: tau1" in answer and "log.csv: the answer predicts tau1" in answer
     assert re.search(r"Fc2 \[N\*m\] +│ +(1.0\d*|0.99\d*) ", answer), answer
+
+
+def test_a_coarse_encoder_is_doubted(tmp_path: Path) -> None:
+    chain = chain_of(tmp_path, URDF)
+    warnings = []
+    for bits in (14, 11):
+        log = robot_arms.log_of(chain, 1, bits=bits, blur=0.0)
+        warnings.append(pvid.identify(log, model=tmp_path / "robot.py").warning)
+    assert warnings[0] is None
+    assert warnings[1] is not None and "stays on one count in" in warnings[1]
+
+
+def test_torques_in_the_wrong_columns_are_doubted(tmp_path: Path) -> None:
+    log = robot_arms.log_of(chain_of(tmp_path, URDF), 1)
+    found = pvid.identify(log | {"tau1": log["tau1"][::-1]}, model=tmp_path / "robot.py")
+    assert found.warning is not None and "of tau1 is explained on unseen motion" in found.warning

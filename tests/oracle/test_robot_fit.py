@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,12 @@ import pytest
 import robot_arms
 
 from pvid.base.errors import PvidError
+from pvid.identification.robot import answer_of_robot
 from pvid.model import Robot
 from pvid.model.chain import Chain
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.robot import RobotFit, RobotRun, identify_robot
+from pvid.rig.run import Recording
 
 RATE = 500.0
 SPATIAL = robot_arms.arm("spatial", seed=5)
@@ -108,3 +111,20 @@ def test_a_recording_that_shows_nothing_is_refused(name: str) -> None:
 def test_a_slow_clock_is_refused() -> None:
     with pytest.raises(PvidError, match="50 samples a second are too few for a robot: record at 100 Hz or more"):
         identify_robot(model_of(SPATIAL), robot_arms.log_of(SPATIAL, 0), 50.0)
+
+
+def test_what_a_fit_does_not_determine_has_no_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = robot_arms.log_of(SPATIAL, 0)
+    fit, recording = fits(1)[0], Recording(log.pop("t"), log, RATE)
+    first = np.arange(len(fit.p)) == 0
+    for changed, name, sentence in (
+        (replace(fit, undetermined=first), "undetermined", "the motion does not determine Izz1_R"),
+        (replace(fit, undetermined=first | True), "not_identified", "the motion determines no parameter"),
+        (replace(fit, apart=10.0 * first), "halves", "the two halves of the recording disagree about Izz1_R"),
+    ):
+        monkeypatch.setattr("pvid.identification.robot.identify_robot", lambda *_, one=changed: one)
+        answer = answer_of_robot(recording, fit.run.model)
+        assert [one.name for one in answer.verdict.reasons] == [name]
+        assert answer.verdict.reasons[0].text.startswith(sentence)
+        assert (answer.values["Izz1_R"].value is None) == (name != "halves")
+        assert answer.identified == (name != "not_identified")

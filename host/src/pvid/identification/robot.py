@@ -19,6 +19,7 @@ from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 
 _CLASH = 4.5  # standard errors between the halves: one of 60 parameters is as far apart once in 2000 runs
+_STILL = 0.3  # of the samples; at 0.37 (13 bits, 1 kHz, 0.6 rad/s) errors of friction are 1.6 standard errors (rms)
 _EXPLAINED = 0.9  # R^2 of a torque below which the equations do not explain it
 
 
@@ -73,6 +74,14 @@ class RobotAnswer(Answer):
         if apart:
             text = f"the two halves of the recording disagree about {listed(apart)}: does friction change with heat?"
             reasons.append(Reason("halves", text, of=tuple(apart)))
+        worst = int(np.argmax(fit.design.still))
+        if fit.design.still[worst] > _STILL:
+            text = (
+                f"q{worst + 1} stays on one count in {fit.design.still[worst]:.0%} of the samples: its rounding is "
+                "then no white noise, and standard errors, most of all of friction, may be too small; move faster, or "
+                "record with more bits"
+            )
+            reasons.append(Reason("sensor", text))
         weak = [one.name for one in self.prediction if one.r2 < _EXPLAINED]
         if weak:
             text = (

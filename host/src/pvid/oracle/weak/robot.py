@@ -57,12 +57,14 @@ class RobotDesign:
     taps : samples of the polynomials
     functions : test functions
     sd : white noise of each encoder's samples [n]
+    still : part of the samples in which each encoder stays on its count [n]
     """
 
     sample_rate: float
     taps: int
     functions: TestFunctions
     sd: Float
+    still: Float
 
 
 class RobotRun:
@@ -107,6 +109,7 @@ class RobotRun:
                 break
             taps = longer
         smooth = self.smoothed(whole, taps, 1)[:, inner]
+        still = np.mean(np.diff(whole, axis=1) == 0, axis=1)
         power = np.abs(np.fft.rfft(smooth - smooth.mean(axis=1, keepdims=True))) ** 2
         gain = np.abs(np.fft.rfft(polynomial_weights(taps, _DEGREE, 1) * rate, smooth.shape[1])) ** 2
         noise = np.outer(sd**2 * smooth.shape[1], gain)
@@ -119,7 +122,7 @@ class RobotRun:
         count = min(max(wanted, _FEWEST), _MOST, 2 * (hop // 2 - _POWER) - 1)
         if rate < _LEAST_HZ:
             raise PvidError(f"{rate:g} samples a second are too few for a robot: record at {_LEAST_HZ:g} Hz or more")
-        return RobotDesign(rate, taps, TestFunctions(count, _POWER, hop, 1 / rate), sd)
+        return RobotDesign(rate, taps, TestFunctions(count, _POWER, hop, 1 / rate), sd, still)
 
     def smoothed(self, q: Float, taps: int, order: int) -> Float:
         """Positions or rates [n, samples]; wrong within half of the ends."""
