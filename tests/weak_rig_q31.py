@@ -112,9 +112,9 @@ class Rig:
         sums = record.sums(functions)
         out = {}
         for mine, theirs in self._places.items():
-            whole = np.zeros((sums.shape[1], functions.highest + 1, 2))
-            whole[:, 0, 0] = sums[theirs, :, 0]
-            whole[:, 1:, 0], whole[:, 1:, 1] = (sums[theirs, :, 1::2], sums[theirs, :, 2::2])
+            whole = np.zeros((len(sums[theirs]), functions.highest + 1, 2))
+            whole[:, 0, 0] = sums[theirs][:, 0]
+            whole[:, 1:, 0], whole[:, 1:, 1] = (sums[theirs][:, 1::2], sums[theirs][:, 2::2])
             out[mine] = whole
         return out
 

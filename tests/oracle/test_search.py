@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -98,3 +99,15 @@ def test_a_clean_run_is_identified_by_few_weightings_and_few_searches_for_revers
     found = identify(simulation.model, simulation.run(3), simulation.rig.sample_rate)
     assert found.verdict.warning is None
     assert 20 < count["white"] < 190 and 5 < count["located"] < 35, count
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("coast_down", 300.0), ("coasting_motor", 12.0)])
+def test_a_mechanism_that_comes_to_rest_is_identified_from_its_motion(name: str, seconds: float) -> None:
+    """At rest the noise of a speed is no reversal of it, and friction is any force up to its own."""
+    shipped = simulation_of(name)
+    simulation = replace(shipped, rig=replace(shipped.rig, duration=seconds), _motions={})
+    found = identify(simulation.model, simulation.run(3), simulation.rig.sample_rate)
+    assert found.verdict.warning is None and found.chi2 == pytest.approx(1.0, abs=0.2)  # 28 windows of 12 rows
+    assert all(one.status == "identified" for one in found.judged)
+    assert np.all(np.abs(found.p - simulation.truth) < 4 * found.se)
+    assert sum(one.reversals for one in found.fit.rows.record.signs) < 200

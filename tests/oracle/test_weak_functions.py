@@ -14,7 +14,7 @@ from pvid.oracle.weak import reversals
 from pvid.oracle.weak.channels import running_integrals
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import Float, TestFunctions
-from pvid.oracle.weak.whitener import Whitener, holders
+from pvid.oracle.weak.whitener import Whitener, holders, inverse_of_lower
 
 FUNCTIONS = TestFunctions(count=13, power=6, hop=50, dt=0.01)
 T = FUNCTIONS.dt * np.arange(2 * FUNCTIONS.hop)
@@ -228,8 +228,39 @@ def test_windows_are_whitened_at_the_cost_of_their_own_directions() -> None:
     assert some.log_determinant() == pytest.approx(sum(np.linalg.slogdet(one)[1] for one in whole[5:40]))
 
 
+def test_reversals_near_each_other_are_written_in_their_order() -> None:
+    """Of a velocity that chatters: a later one replaces the signs and corrections of earlier ones around it."""
+    rng = np.random.default_rng(3)
+    v = rng.normal(size=300) * np.repeat(rng.uniform(0.02, 1.0, 30), 10)
+    got = reversals.located(v, 0.05, np.zeros(v.size), 6)
+    stretches = reversals.in_doubt(v, 3 * 0.05 + np.zeros(v.size))
+    turns = [(i, j) for i, j in stretches if 0 < i and j < v.size and j - i <= 6 and v[i - 1] * v[j] < 0]
+    assert len(turns) == got.reversals > 40
+    values = got.values.copy()
+    for i, j in turns:
+        values[i:j] = 0.0
+    values[~got.stuck & (values != 0)] = np.sign(v)[~got.stuck & (values != 0)]
+    for i, j in stretches:
+        if 0 < i and j < v.size and v[i - 1] * v[j] > 0 and j - i <= 6:
+            values[i:j] = np.sign(v[j])
+    for i, j in turns:
+        t, up, span = reversals.zeros_between(v, np.array([i]), np.array([j]))[0], np.sign(v[j]), j - i + 1
+        for step in range(max(int(t - span) - 2, 0), min(int(t + span) + 3, v.size)):
+            if not got.stuck[step] and (values[step] == 0 or abs(step - t) <= span):
+                values[step] = -up if step <= t else up
+        if 1 <= int(t) < v.size - 2:
+            values[int(t) - 1 : int(t) + 3] += up * reversals.correction(np.array(t % 1))
+    assert got.values[~got.stuck] == pytest.approx(values[~got.stuck], abs=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 8, 9, 41])
+def test_inverses_of_lower_triangles_by_halves(n: int) -> None:
+    k = np.tril(np.random.default_rng(n).normal(size=(3, n, n))) + 3 * np.eye(n)
+    assert inverse_of_lower(k) @ k == pytest.approx(np.broadcast_to(np.eye(n), k.shape), abs=1e-9)
+
+
 @pytest.mark.parametrize("gap", [1, 2, 7])
 def test_the_zero_of_a_doubtful_stretch_is_that_of_its_least_squares_line(gap: int) -> None:
     v = np.linspace(-1.0, 1.5, gap + 2) + 0.1 * np.random.default_rng(gap).normal(size=gap + 2)
     slope, level = np.polyfit(np.arange(gap + 2), v, 1)
-    assert reversals.zero_between(v, 1, gap + 1) == pytest.approx(-level / slope)
+    assert reversals.zeros_between(v, np.array([1]), np.array([gap + 1])) == pytest.approx([-level / slope])

@@ -66,7 +66,7 @@ def with_noisy_means(sizes: WeakDesign32, rows: WeakRows, p: Float) -> WeakDesig
     mean of u would be so large that the entries of the other harmonics lose their digits beside it.
     """
     theta = rows.compiled.parameters.theta(p)
-    means = np.abs(rows.record.sums(rows.functions)[:, :, 0])
+    means = np.abs([one[:, 0] for one in rows.record.sums(rows.functions)])
     variance = sizes.error_variance.copy()
     for kind, plan in enumerate(rows.compiled.channels.rows):
         own = np.append(theta[kind], -1.0)

@@ -155,6 +155,17 @@ class Channels:
         return tuple(sorted({one.args[0] for one in atoms}, key=str))
 
     @cached_property
+    def signs_of_rows(self) -> list[set[int]]:
+        """Places of the signs in each row kind, those of its auxiliary signals included."""
+
+        def within(one: sp.Expr) -> set[int]:
+            inside = one.xreplace(dict(self.opaque))
+            return {place for place, argument in enumerate(self.signs) if inside.has(sgn(argument))}
+
+        own = [within(one.gain) | within(one.integrand) for one in self.channels]
+        return [set().union(*(own[term.channel] for term in row.terms)) for row in self.rows]
+
+    @cached_property
     def needed(self) -> set[Jet]:
         """Jets of signals that the channels, auxiliary signals and signs need."""
         found = set().union(*(jets(one) for one in (*self.expressions, *self.opaque.values(), *self.signs)))
@@ -188,8 +199,8 @@ class Channels:
         """Adds the auxiliary signals; a running integral in one of them begins at the run's first sample."""
         for jet, expression in self.opaque.items():
             known = dict(values)
-            for one in sorted(expression.atoms(Integral), key=sp.default_sort_key):
-                mark = sp.Dummy()
+            for place, one in enumerate(sorted(expression.atoms(Integral), key=sp.default_sort_key)):
+                mark = sp.Dummy("integral", dummy_index=place)
                 integrand, fold = one.args
                 inside = broadcast(evaluated(integrand.xreplace(self.sign_marks), known), grid.size)
                 known[mark] = running_integrals(inside, grid.size - 1, int(fold), grid.design.dt)[int(fold)][0]
@@ -326,9 +337,11 @@ class Channels:
             return self._located[*key, piece]
         variance = 0.0
         for jet, one in weights.items():
-            if jet.order == 1:
-                slope = self.function([one])(*[grid.jets.get(x, 0.0) for x in self.plain])[0]
-                variance += float(np.mean(np.square(slope))) * (self.model.signal(jet.of).sd * per_sensor) ** 2
+            if not jet.order and design.reversals == "decided":
+                continue  # the limits of doubt in C are of derivatives alone
+            slope = self.function([one])(*[grid.jets.get(x, 0.0) for x in self.plain])[0]
+            of_signal = float(np.sum(design.weights(jet.order) ** 2)) * self.model.signal(jet.of).sd ** 2
+            variance += float(np.mean(np.square(slope))) * of_signal
         if design.reversals == "decided":
             return reversals.decided(v, variance**0.5, np.zeros(v.shape))
         return reversals.located(v, variance**0.5, np.zeros(v.shape), piece)
@@ -387,7 +400,9 @@ class Record:
         self.channels, self.grid, self.gains, self.integrands = channels, grid, gains, integrands
         self.signs, self.arguments = signs, arguments
         self._fresh: Sequence[int] = range(len(gains)) if like is None else like[1]
-        self._sums: tuple[TestFunctions, Float] | None = None if like is None else like[0]._sums
+        # Test functions, sums of every channel, and rows of some, by channel and order.
+        self._known: tuple[TestFunctions | None, list[Float], dict[tuple[int, int], Float]]
+        self._known = (None, [], {}) if like is None else like[0]._known
 
     @classmethod
     def joined(cls, records: Sequence[Record], firsts: Sequence[int], samples: int) -> Record:
@@ -422,24 +437,26 @@ class Record:
             [together(one.arguments[k] for one in records) for k in range(len(records[0].arguments))],
         )
 
-    def sums(self, functions: TestFunctions) -> Float:
-        """(S_0, Re S_1, Im S_1, ...) of every channel and window [channels, windows, 2 H + 1]."""
-        if self._sums is not None and self._sums[0] is functions:
-            out, fresh = self._sums[1].copy(), self._fresh
-        else:
-            out = np.empty((len(self.gains), self.grid.size // functions.hop - 1, 2 * functions.highest + 1))
-            fresh = range(len(self.gains))
+    def sums(self, functions: TestFunctions) -> list[Float]:
+        """(S_0, Re S_1, Im S_1, ...) of every channel [windows, 2 H + 1]."""
+        of, known, products = self._known
+        if of is functions and not self._fresh:
+            return known
+        fresh = self._fresh if of is functions else range(len(self.gains))
+        out = list(known) if of is functions else [np.zeros(0)] * len(self.gains)
         channels = self.channels.channels
         if plain := [k for k in fresh if channels[k].fold == 0]:
-            out[plain] = functions.window_sums(self.gains[plain])
+            for k, one in zip(plain, functions.window_sums(self.gains[plain]), strict=True):
+                out[k] = one
         for k in fresh:
             if channels[k].fold:
-                out[k] = 0.0
+                out[k] = np.zeros((self.grid.size // functions.hop - 1, 2 * functions.highest + 1))
                 for part in self.grid.parts:
                     first = part.start // functions.hop
                     own = self._integral_sums(k, channels[k].fold, functions, part)
-                    out[k, first : first + len(own)] = own
-        self._fresh, self._sums = [], (functions, out)
+                    out[k][first : first + len(own)] = own
+        kept = {key: one for key, one in products.items() if of is functions and key[0] not in fresh}
+        self._fresh, self._known = [], (functions, out, kept)
         return out
 
     def _integral_sums(self, k: int, fold: int, functions: TestFunctions, part: slice) -> Float:
@@ -460,21 +477,20 @@ class Record:
             second += running[fold - m][:-1, -1:] * functions.half_sums(gain * shape)[1:]
         return functions.joined(own[:-1], second)
 
+    def rows(self, functions: TestFunctions, term: Term) -> Float:
+        """(-1)^order sum chi^(order) channel of a term [windows, K]; the same object where a channel is the same."""
+        sums, products, key = self.sums(functions), self._known[2], (term.channel, term.order)
+        if key not in products:
+            products[key] = (-1.0) ** term.order * (sums[term.channel] @ functions.combine(term.order))
+        return products[key]
+
     def columns(self, functions: TestFunctions) -> list[Float]:
         """Columns of each row kind [windows, columns, K]."""
-        sums = self.sums(functions)
-        tables: dict[int, Float] = {}
         out = []
         for row in self.channels.rows:
-            columns = np.zeros((sums.shape[1], row.columns, functions.count))
-            for order in sorted({term.order for term in row.terms}):
-                table = tables.setdefault(order, (-1.0) ** order * functions.combine(order))
-                mixed = np.zeros((row.columns, len(self.gains)))
-                for term in row.terms:
-                    if term.order == order:
-                        mixed[term.column, term.channel] += term.factor
-                used = np.flatnonzero(mixed.any(axis=0))
-                columns += np.einsum("jc,cwh->wjh", mixed[:, used], sums[used], optimize=True) @ table
+            columns = np.zeros((self.grid.size // functions.hop - 1, row.columns, functions.count))
+            for term in row.terms:
+                columns[:, term.column] += term.factor * self.rows(functions, term)
             out.append(columns)
         return out
 

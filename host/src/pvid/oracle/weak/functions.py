@@ -19,6 +19,11 @@ Float = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 
+def product(x: Float, matrix: Float) -> Float:
+    """x @ matrix, as one product [..., columns of the matrix]."""
+    return np.asarray((x.reshape(-1, x.shape[-1]) @ matrix).reshape(*x.shape[:-1], matrix.shape[-1]))
+
+
 @dataclass(frozen=True)
 class TestFunctions:
     """K test functions on windows of 2 hop steps of dt [s].
@@ -171,21 +176,13 @@ class TestFunctions:
 
     def half_sums(self, halves: Float) -> Complex:
         """A_h [..., halves, H + 1] of half windows [..., halves, hop]; time counts from each half's start."""
-        real, imaginary = self._turns
-        return np.asarray((halves @ real) + 1j * (halves @ imaginary))
-
-    @cached_property
-    def _turns(self) -> tuple[Float, Float]:
-        """Real and imaginary parts of `circle`."""
-        return self.circle.real.copy(), self.circle.imag.copy()
+        return product(halves, self.circle.view(np.float64)).view(np.complex128)
 
     def joined(self, first: Complex, second: Complex) -> Float:
         """S_h = A_h + (-1)^h B_h as (S_0, Re S_1, Im S_1, ...) [..., 2 H + 1] of two halves' sums [..., H + 1]."""
-        whole = first + second * (-1.0) ** np.arange(self.highest + 1)
-        out = np.empty((*whole.shape[:-1], 2 * self.highest + 1))
-        out[..., 0] = whole[..., 0].real
-        out[..., 1::2] = whole[..., 1:].real
-        out[..., 2::2] = whole[..., 1:].imag
+        whole = (first + second * (-1.0) ** np.arange(self.highest + 1)).view(np.float64)
+        out = whole[..., 1:].copy()
+        out[..., 0] = whole[..., 0]  # S_0 has no imaginary part
         return out
 
     def window_sums(self, x: Float) -> Float:

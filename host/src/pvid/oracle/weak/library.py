@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from pvid.model.compiled import CompiledModel
 from pvid.model.evaluation import numpy_function
+from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.filters import polynomial_weights
 from pvid.oracle.weak.front import filtered, largest
@@ -90,10 +91,9 @@ class Library:
         whole = replace(self.design, window_s=2 * self.design.hop * self.design.dt)  # as many steps at any rate
         factor = 1 + _STEP
         faster = replace(whole, sample_rate=whole.sample_rate * factor, window_s=whole.window_s / factor)
-        before, after = (
-            self.scores.columns_of(record_of(self.fit.rows.compiled, self.run, one)) for one in (whole, faster)
-        )
-        return self.scores.shift_by(between(before, after, _STEP)(self.scores.theta))
+        before, after = (record_of(self.fit.rows.compiled, self.run, one) for one in (whole, faster))
+        change = between(before, after, self.fit.rows.numbers, _STEP)
+        return self.scores.shift_by(change(self.scores.theta))
 
     @cached_property
     def candidates(self) -> list[Candidate]:
@@ -225,8 +225,12 @@ class Library:
             step = -_STEP * recorded.top / max(largest(other), 1e-300)
             other = recorded.values - step * other
         name = recorded.signal.name
-        record = record_of(self.fit.rows.compiled, {**self.run, name: other}, self.design)
-        return Candidate(name, name, act, level, self.scores.change_to(record, step), recorded.top, act.most(recorded))
+        change = self.scores.change_to(self._record({**self.run, name: other}), step)
+        return Candidate(name, name, act, level, change, recorded.top, act.most(recorded))
+
+    def _record(self, run: Mapping[str, npt.ArrayLike]) -> Record:
+        """Channels of another run."""
+        return record_of(self.fit.rows.compiled, run, self.design, like=self.fit.rows.record)
 
     @cached_property
     def _again(self) -> Library:
@@ -236,13 +240,13 @@ class Library:
             if one.sd:
                 run[one.name] = np.asarray(run[one.name]) + one.sd * random.normal(size=np.size(run[one.name]))
         rows = copy.copy(self.fit.rows)
-        rows.columns = self.scores.columns_of(record_of(rows.compiled, run, self.design))
+        rows.record = self._record(run)
         return Library(run, self.design, replace(self.fit, rows=rows))
 
     @cached_property
     def noise(self) -> Change:
         """What as much noise again adds to the residuals."""
-        return between(self.fit.rows.columns, self._again.fit.rows.columns, 1.0)
+        return self.scores.change_to(self._again.fit.rows.record, 1.0)
 
     def noise_in(self, one: Candidate) -> Change:
         """What as much noise again adds to a candidate's change."""

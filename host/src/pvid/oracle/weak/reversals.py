@@ -109,15 +109,22 @@ def in_doubt(v: Float, threshold: Float) -> npt.NDArray[np.int64]:
     return stretches[np.argsort(stretches[:, 0], kind="stable")]
 
 
-def zero_between(v: Float, first: int, behind: int) -> float:
-    """Zero [steps] of the straight line through v from the step before `first` to `behind`."""
-    i, j = first - 1, behind
-    if j - i == 1:
-        return float(i + v[i] / (v[i] - v[j]))
-    middle, mean = (j - i) / 2, float(np.mean(v[i : j + 1]))
-    slope = float((np.arange(j - i + 1) - middle) @ v[i : j + 1]) / ((j - i) * (j - i + 1) * (j - i + 2) / 12)
-    zero = middle - mean / slope if slope * (v[j] - v[i]) > 0 else middle
-    return float(i + min(max(zero, 0.0), j - i))
+def zeros_between(v: Float, first: npt.NDArray[np.int64], behind: npt.NDArray[np.int64]) -> Float:
+    """Zeros [steps] of the straight lines through v from the step before each `first` to its `behind` [stretches]."""
+    out, gaps = np.zeros(len(first)), behind - first + 1
+    for gap in np.unique(gaps).tolist():
+        own = np.flatnonzero(gaps == gap)
+        x = v[first[own, np.newaxis] - 1 + np.arange(gap + 1)]
+        slope = x @ (np.arange(gap + 1) - gap / 2) / (gap * (gap + 1) * (gap + 2) / 12)
+        rises = slope * (x[:, -1] - x[:, 0]) > 0
+        out[own] = gap / 2 - np.where(rises, np.mean(x, axis=1) / np.where(rises, slope, 1.0), 0.0)
+        out[own] = first[own] - 1 + np.clip(out[own], 0, gap)
+    return out
+
+
+def _counted(counts: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """0, 1, ... up to each of the counts, one behind the other."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def refined(position: Float, start: Float, half: int, sd: float) -> tuple[Float, Float]:
@@ -201,33 +208,25 @@ def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position |
     piece : a stretch in doubt that is longer [steps] is cut into pieces; a test function hardly changes within one
     position : None: reversals are zeros of v
     """
-    stretches = in_doubt(v, _NOISES * sd_v + blur)
-    values = np.sign(v)
-    stuck = np.zeros(v.shape, bool)
-    n = len(v)
-    times, spans, turning = [], [], []
-    for i, j in stretches:
-        before = np.sign(v[i - 1]) if i > 0 else 0.0
-        after = np.sign(v[j]) if j < n else 0.0
-        if j - i > piece or before * after == 0:
-            stuck[i:j] = True
-            values[i:j] = before + (after - before) * (np.arange(j - i) + 0.5) / (j - i)
-            count = -(-(j - i) // piece)
-            times += list(i + (np.arange(count) + 0.5) * (j - i) / count - 0.5)
-            # The pieces err together: their variances sum up to that of the whole stretch.
-            spans += [(j - i) / count**0.5] * count
-            turning += [0.0] * count
-        elif before == after:
-            values[i:j] = before
-            times.append((i + j - 1) / 2)
-            spans.append(float(j - i))
-            turning.append(0.0)
-        else:
-            times.append(zero_between(v, int(i), int(j)))
-            spans.append(float(j - i + 1))
-            turning.append(after)
-            values[i:j] = 0.0
-    t, span, up = np.array(times), np.array(spans), np.array(turning)
+    first, behind = in_doubt(v, _NOISES * sd_v + blur).T
+    values, stuck, n = np.sign(v), np.zeros(v.shape, bool), len(v)
+    length = behind - first
+    before = np.where(first > 0, values[first - 1], 0.0)
+    after = np.where(behind < n, values[np.minimum(behind, n - 1)], 0.0)
+    long = (length > piece) | (before * after == 0)
+    turning = ~long & (before != after)
+    count = np.where(long, -(-length // piece), 1)
+    of = np.repeat(np.arange(len(count)), count)  # stretch of each time
+    t = first[of] + (_counted(count) + 0.5) * length[of] / count[of] - 0.5
+    t[turning[of]] = zeros_between(v, first[turning], behind[turning])
+    # The pieces err together: their variances sum up to that of the whole stretch.
+    span = length[of] / np.sqrt(count[of]) + turning[of]
+    up = np.where(turning, after, 0.0)[of]
+    of = np.repeat(np.arange(len(length)), length)  # stretch of each step in doubt
+    place = first[of] + _counted(length)
+    rise = np.where(long, after - before, 0.0)[of] * (_counted(length) + 0.5) / length[of]
+    values[place] = np.where(turning, 0.0, before)[of] + rise
+    stuck[place] = long[of]
     # A sign anywhere in -1..1 over L steps is as a reversal with a standard deviation of L / sqrt(12).
     variances = span**2 / 12
     turns = np.flatnonzero(up)
@@ -245,13 +244,33 @@ def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position |
             t[turns] = np.where(better, (raw - position.places[0]) / stride, t[turns])
             variances[turns] = np.where(better, spread / stride**2, variances[turns] + span[turns] ** 2 / 12)
         variances[turns] += _FLOOR**2 + (_DOUBT * span[turns]) ** 2
-    for k, corrected in zip(turns, up[turns, np.newaxis] * correction(t[turns] % 1.0), strict=True):
-        at = int(np.floor(t[k]))
-        low, high = max(int(t[k] - span[k]) - 2, 0), min(int(t[k] + span[k]) + 3, n)
-        own = np.arange(low, high)
-        own = own[(values[own] == 0) | (np.abs(own - t[k]) <= span[k])]
-        own = own[~stuck[own]]
-        values[own] = np.where(own <= t[k], -up[k], up[k])
-        if 1 <= at < n - 2:
-            values[at - 1 : at + 3] += corrected
+    _turn(values, stuck, t[turns], span[turns], up[turns])
     return Signs(values, t, variances, len(turns), stuck, np.zeros(n))
+
+
+def _turn(values: Float, stuck: npt.NDArray[np.bool_], t: Float, span: Float, up: Float) -> None:
+    """Writes the signs around reversals, one after the other: a later one that is near replaces an earlier one.
+
+    Parameters
+    ----------
+    values : 0 where a reversal gives the sign [n]; in place
+    t, span, up : time of each reversal, how long its sign is in doubt [steps], and the sign behind it
+    """
+    n, turns = len(values), np.arange(len(t))
+    low = np.maximum((t - span).astype(np.int64) - 2, 0)
+    width = np.maximum(np.minimum((t + span).astype(np.int64) + 3, n) - low, 0)
+    turn = np.repeat(turns, width)
+    step = low[turn] + _counted(width)
+    first, last = np.zeros((2, n), np.int64) - 1
+    first[step[::-1]] = turn[::-1]
+    written = (np.abs(step - t[turn]) <= span[turn]) | ((values[step] == 0) & (first[step] == turn))
+    written &= ~stuck[step]
+    last[step[written]] = turn[written]
+    own = np.flatnonzero(last >= 0)
+    values[own] = np.where(own <= t[last[own]], -up[last[own]], up[last[own]])
+    at = np.floor(t).astype(np.int64)
+    inside = (at >= 1) & (at < n - 2)
+    near = at[inside, np.newaxis] + np.arange(-1, 3)
+    corrected = up[inside, np.newaxis] * correction(t[inside] % 1.0)
+    kept = turns[inside, np.newaxis] >= last[near]
+    np.add.at(values, near[kept], corrected[kept])

@@ -29,6 +29,8 @@ from pvid.rig.run import NUMBER
 # Rows that are numerically dependent get this part of the mean variance.
 _RIDGE = 1e-10
 
+_REST = 0.9  # of the steps of a half window: the noise of a velocity passes the limit of doubt in a few
+
 
 class Compiled:
     """A model made ready for numbers, once: channels, noise filters, theta(p).
@@ -137,10 +139,26 @@ def _decided(record: Record, windows: int) -> npt.NDArray[np.bool_]:
     return np.asarray(halves[:-1] & halves[1:])
 
 
+def _at_rest(record: Record, windows: int) -> npt.NDArray[np.bool_]:
+    """Of each window, whether every equation has a friction, and all signs are in doubt nearly all the time: there it
+    holds the mechanism with any force up to its own, which no equation contains [windows]."""
+    hop, signs = record.grid.design.hop, record.channels.signs_of_rows
+    if not record.signs or not all(signs):
+        return np.zeros(windows, bool)
+    stuck = np.all([record.signs[k].stuck for k in set().union(*signs)], axis=0)
+    halves = stuck[: (windows + 1) * hop].reshape(windows + 1, hop).mean(axis=1)
+    return np.asarray((halves[:-1] > _REST) & (halves[1:] > _REST))
+
+
 def record_of(
-    compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign, times: Mapping[Jet, float] | None = None
+    compiled: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    design: WeakDesign,
+    times: Mapping[Jet, float] | None = None,
+    like: Record | None = None,
 ) -> Record:
-    """Channels of a run (name -> samples) at every step; a segment between missing samples is a run of its own.
+    """Channels of a run (name -> samples) at every step; a segment between missing samples is a run of its own. What
+    they have in common with those `like` them, or else the last ones, is taken from there.
 
     A model with an integral since the start of the run has one segment of each recording, its longest: behind a gap
     nobody knows the integral.
@@ -153,7 +171,7 @@ def record_of(
     if any(one.has(Integral) for one in compiled.channels.opaque.values()):
         segments = longest_of_each(segments, run)
     size = len(next(iter(samples.values())))
-    last = compiled.channels.last
+    last = like or compiled.channels.last
     if times is not None or (last is not None and last.grid.raw_size != size) or len(segments) > 1:
         last = None
     records, firsts = [], []
@@ -195,6 +213,8 @@ class WeakRows:
         whole[record.grid.across] = False
         if record.grid.design.reversals == "decided" and record.signs:
             whole &= _decided(record, len(whole))
+        moving = whole & ~_at_rest(record, len(whole))
+        whole = moving if moving.any() else whole
         if not whole.any():
             raise PvidError("no window of the run is whole: every one has a missing sample")
         self.numbers = np.flatnonzero(whole)

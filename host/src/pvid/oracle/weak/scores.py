@@ -37,15 +37,23 @@ _TOGETHER = 16  # candidates
 _OF_SCORE = 2e-5  # units of work for an entry of a column
 
 
-def between(before: Sequence[Float], after: Sequence[Float], step: float) -> Change:
-    """Residuals with the columns `after` less those with the columns `before`, over a step; both of each row kind."""
-    apart = [(now - one) / step for now, one in zip(after, before, strict=True)]
+def between(before: Record, after: Record, windows: npt.NDArray[np.int64], step: float) -> Change:
+    """Residuals of some windows with the channels `after` less those with the channels `before`, over a step."""
+    functions, other = (one.grid.design.test_functions for one in (before, after))
+    apart = []
+    for row in before.channels.rows:
+        own: dict[int, Float] = {}
+        for term in row.terms:
+            was, now = before.rows(functions, term), after.rows(other, term)
+            if term.column <= row.thetas and was is not now:
+                more = term.factor / step * (now[windows] - was[windows])
+                own[term.column] = own[term.column] + more if term.column in own else more
+        apart.append(own)
 
     def change(theta: Sequence[Float]) -> list[Float]:
-        return [
-            one[:, len(th)] - np.einsum("wjk,j->wk", one[:, : len(th)], th)
-            for one, th in zip(apart, theta, strict=True)
-        ]
+        weights = [np.append(-th, 1.0) for th in theta]
+        none = np.zeros((len(windows), functions.count))
+        return [sum((w[k] * one for k, one in own.items()), none) for own, w in zip(apart, weights, strict=True)]
 
     return change
 
@@ -69,11 +77,7 @@ class Scores:
 
     def change_to(self, record: Record, step: float) -> Change:
         """Residuals with other channels less those with the recorded ones, over a step."""
-        return between(self.fit.rows.columns, self.columns_of(record), step)
-
-    def columns_of(self, record: Record) -> list[Float]:
-        """Of other channels, at the windows of the fit, of each row kind."""
-        return [one[self.fit.rows.numbers] for one in record.columns(record.grid.design.test_functions)]
+        return between(self.fit.rows.record, record, self.fit.rows.numbers, step)
 
     def shift_by(self, change: Sequence[Float]) -> Float:
         """What p moves by when each kind's raw residuals change by so much [windows, K] [n_p]."""

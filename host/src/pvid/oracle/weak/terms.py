@@ -193,7 +193,8 @@ def _without_cubic(of: Recorded, level: float) -> Float:
     relative = of.values / of.top
     x = relative.copy()
     for _ in range(_NEWTON):
-        x = x - (x - level * x**3 - relative) / np.maximum(1 - 3 * level * x**2, _STEEPEST)
+        cubic = level * x * x
+        x = x - (x - cubic * x - relative) / np.maximum(1 - 3 * cubic, _STEEPEST)
     return np.asarray(of.top * x)
 
 
