@@ -14,10 +14,15 @@ from pvid.models.mechanisms import compiled_of
 from pvid.rig.columns import Columns, parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, read_recording
+from pvid.rig.sensor_noise import with_noise
 from pvid.rig.sensor_steps import with_resolutions
 from pvid.rig.together import joined
 
 Reader = Callable[[Columns], Recording]
+
+# A mechanism without an input that moves by less than so many standard deviations of its sensors' noise for so many
+# samples, and by so many times as much in as many samples behind them, was held.
+_STILL, _LEAST_HELD, _RELEASED = 6.0, 20, 30.0
 
 
 def read_all(
@@ -46,13 +51,36 @@ def read_all(
     given = parsed(columns, channels_of(model))
     parts = [_read(one, rig, model, given) for one in sources]
     recording = parts[0] if len(parts) == 1 else joined(parts, names, given)
-    return with_resolutions(recording.whole() if whole else recording, model)
+    recording, model = with_noise(*with_resolutions(recording, model))
+    recording = without_hold(recording, model)
+    return recording.whole() if whole else recording, model
 
 
 def _read(source: Path | Reader, rig: MechanismRig, model: CompiledModel, given: Columns) -> Recording:
     recording = read_recording(source, rig.sample_rate, given) if isinstance(source, Path) else source(given)
     recording.refuse_damaged()
     return without_wild_samples(aligned(recording, model), model)
+
+
+def without_hold(recording: Recording, model: CompiledModel) -> Recording:
+    """Without the samples at the beginning of each stretch in which a mechanism that no input moves is held."""
+    if any(one.kind == "input" or one.driven for one in model.signals):
+        return recording
+    signals, notes = {name: one.copy() for name, one in recording.signals.items()}, list(recording.notes)
+    for part in recording.segments:
+        off = np.zeros(part.stop - part.start)
+        for one in model.signals:
+            x = signals[one.name][part]
+            off = np.maximum(off, np.abs(x - np.median(x[:_LEAST_HELD])) / (one.sd or np.inf))
+        held = int(np.argmax(off > _STILL))
+        if held >= _LEAST_HELD and off[held : 2 * held].max() > _RELEASED * _STILL:
+            for values in signals.values():
+                values[part.start : part.start + held] = np.nan
+            begin, end = recording.t[part.start], recording.t[part.start + held]
+            notes.append(
+                f"nothing moves from {begin:.6g} s to {end:.6g} s, as if held, and no input moves it: left out"
+            )
+    return replace(recording, signals=signals, notes=tuple(notes)) if len(notes) > len(recording.notes) else recording
 
 
 def aligned(recording: Recording, model: CompiledModel) -> Recording:
