@@ -41,6 +41,7 @@ FREE = '<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbod
 BALL = '<mujoco><worldbody><body><joint name="b" type="ball"/><geom size="0.1"/></body></worldbody></mujoco>'
 STILL = '<mujoco><worldbody><body><geom size="0.1"/></body></worldbody></mujoco>'
 SPRING = '<mujoco><worldbody><body><joint name="s" stiffness="2"/><geom size="0.1"/></body></worldbody></mujoco>'
+SMALL = '<mujoco><worldbody><body><joint axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/></body></worldbody></mujoco>'
 ONE = '<body><joint/><geom size="0.1"/>'
 MANY = f"<mujoco><worldbody>{ONE * 13}{'</body>' * 13}</worldbody></mujoco>"
 COUPLED = '<equality><joint joint1="slide" joint2="other"/></equality>'
@@ -160,3 +161,41 @@ def test_torques_in_the_wrong_columns_are_doubted(tmp_path: Path) -> None:
     log = robot_arms.log_of(chain_of(tmp_path, URDF), 1)
     found = pvid.identify(log | {"tau1": log["tau1"][::-1]}, model=tmp_path / "robot.py")
     assert found.warning is not None and "of tau1 is explained on unseen motion" in found.warning
+
+
+OTHERS = {
+    "build": "model build robot.py -o built",
+    "predict": "model predict robot.py",
+    "simulate": "model simulate robot.py run.csv",
+    "deploy": "deploy robot.py --run log.csv -o made --for arduino",
+    "compare": "compare log.csv --model robot.py",
+    "tune": "tune log.csv --model robot.py",
+    "plot": "plot log.csv --model robot.py -o figure.png",
+    "validate": "validate log.csv --from answer.json --model robot.py",
+    "core": "identify log.csv --model robot.py --core f32",
+    "refine": "identify log.csv --model robot.py --refine",
+    "report": "identify log.csv --model robot.py --report report.html",
+    "add": "identify log.csv --model robot.py --add k*q1",
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_commands_take_no_robot(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    log = robot_arms.log_of(chain_of(tmp_path, SMALL), 1, seconds=4.0)  # of 6 parameters, which C could take
+    np.savetxt("log.csv", np.array(list(log.values())).T, delimiter=",", header=",".join(log), comments="")
+    Path("answer.json").write_text('{"parameters": {}}')
+    found = CliRunner().invoke(commands, OTHERS[name].split(), standalone_mode=False)
+    told = str(found.exception or found.output)
+    assert "robot is a robot, which" in told and "does not take: `pvid identify` in float64 does" in told
+
+
+def test_python_has_its_answer_and_no_simulation(tmp_path: Path) -> None:
+    log = robot_arms.log_of(chain_of(tmp_path, SMALL), 1)
+    found = pvid.identify(log, model=tmp_path / "robot.py")
+    assert found.identified and found.covariance.shape == (5, 5)
+    assert found["Fc1"].value == pytest.approx(1.0, abs=0.01)  # 5 standard errors
+    assert found.details["prediction"]["tau1"]["r2"] > 0.99
+    for other in (found.predict, found.validate):
+        with pytest.raises(PvidError, match="is a robot, which a simulation does not take"):
+            other(log)

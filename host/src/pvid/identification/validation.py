@@ -269,6 +269,7 @@ def p_of(model: CompiledModel, values: Mapping[str, float | None]) -> Float:
     PvidError
         Where one has no value.
     """
+    model.refuse_robot("a simulation")
     missing = [name for name in model.p_names if values.get(name) is None]
     if missing:
         raise PvidError(f"{listed(missing)} of {model.name} has no value there: without it no motion can be predicted")
@@ -290,7 +291,7 @@ def predicted(
     PvidError
         Also where a parameter has no value.
     """
-    model.refuse_robot("`pvid validate`")
+    model.refuse_robot("a simulation")
     model = model.alone
     of_each = {name: [value for key, value in values.items() if key.startswith(f"{name}[")] for name in model.p_names}
     own = {name: [one for one in each if one is not None] for name, each in of_each.items() if each}
