@@ -244,6 +244,9 @@ static pvid_reason step_weak(uint32_t kind, unsigned long tick)
 static void gap_weak(void)
 {
     pvid_weak_gap_f32(&weak.self);
+    for (uint8_t i = 0; i < PVID_MAX_CHANNELS; i++) {
+        (void)pvid_weak_rebase_f32(&weak.self, 1u, i, 0.5f);
+    }
 }
 
 static void freeze_weak(bool frozen)

@@ -40,6 +40,7 @@ static void call_all(pvid_weak_f32 *one, pvid_weak_q31 *other)
     pvid_weak_gap_f32(one);
     pvid_weak_gap_q31(other);
     pvid_weak_freeze_f32(one, true);
+    assert_false(pvid_weak_rebase_f32(one, 0, 0, 1.0f));
     pvid_weak_freeze_q31(other, true);
 
     memset(image, 0, sizeof image);

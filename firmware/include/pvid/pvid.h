@@ -8,6 +8,7 @@
 
 #include "pvid/arithmetic.h"
 #include "pvid/commission.h"
+#include "pvid/counter.h"
 #include "pvid/crc32.h"
 #include "pvid/differentiator.h"
 #include "pvid/estimator.h"

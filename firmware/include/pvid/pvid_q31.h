@@ -8,6 +8,7 @@
 #define PVID_PVID_Q31_H
 
 #include "pvid/bank_q31.h"
+#include "pvid/counter.h"
 #include "pvid/crc32.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/fnv_q31.h"

@@ -211,6 +211,15 @@ void pvid_weak_gap_f32(pvid_weak_f32 *self);
  * contain samples from before the resumption. */
 void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen);
 
+/* From now on `sample` is given less `shift` [its unit]: an angle that turns without end is given as counts about a
+ * reference that follows it, and float32 keeps its resolution. Nothing is lost: whatever is stored of the sample moves,
+ * and the sums of a window contain no constant. channel: that of the model which is the sample itself
+ * (`pvid model build` prints it). Call it between two steps. Returns false and changes nothing iff
+ *   - `self` is not initialised, has a second stage, or shift is not finite, or
+ *   - the sample is more than one signal, or the channel occurs without a derivative.
+ * Cost: 30 operations a harmonic. Source: src/weak/rebase_f32.c. */
+bool pvid_weak_rebase_f32(pvid_weak_f32 *self, uint8_t sample, uint8_t channel, float shift);
+
 #ifdef __cplusplus
 }
 #endif

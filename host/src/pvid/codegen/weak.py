@@ -9,6 +9,7 @@ The channels and terms are those of the float64 oracle (pvid.oracle.weak.channel
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -90,6 +91,20 @@ class WeakFunctions:
     def model(self) -> CompiledModel:
         """With corners."""
         return self.functions.model
+
+    @property
+    def turning(self) -> dict[int, int]:
+        """Samples that may turn without end, for derivatives of them alone are used -> the channel that they are."""
+        found = {}
+        inside = (*self.gain_names, *self.integrand_names, *self.sign_names, *self.run_names)
+        for place, name in enumerate(self.samples):
+            uses = [one for one in inside if re.search(rf"\b{name}\b", one)]
+            gains = [self.gain_names.index(one) for one in uses if one in self.gain_names]
+            channels = [k for k, one in enumerate(self.channel) if one.gain in gains]
+            orders = [one.order for one in self.term if one.channel in channels]
+            if uses == [name] and len(channels) == 1 and min(orders, default=0) > 0:
+                found[place] = channels[0]
+        return found
 
 
 @Recent

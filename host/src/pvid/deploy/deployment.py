@@ -33,6 +33,25 @@ class Quantity:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class Turning:
+    """A sample that may turn without end, from the raw counter of its encoder.
+
+    Attributes
+    ----------
+    name, place : among the samples
+    channel : of the model, which it is
+    lsb : of a count
+    limit : count from the reference at which that moves
+    """
+
+    name: str
+    place: int
+    channel: int
+    lsb: float
+    limit: int
+
+
 @dataclass(frozen=True, eq=False)
 class Playback:
     """A recorded motion that the example identifies in place of sensors.
@@ -86,6 +105,7 @@ class Deployment:
     command : that makes it; no date
     first_s : of motion up to the first window that is judged [s]
     second : the refinement; None: the package has none
+    turning : samples that may turn without end
     excitation : of the commissioning; None: the package has none
     causes : of the shared errors, as of WeakConfig
     warnings : of the analysis of the recording that it is made for
@@ -103,6 +123,7 @@ class Deployment:
     first_s: float
     playback: Playback = field(repr=False)
     second: SecondStage | None = None
+    turning: tuple[Turning, ...] = ()
     excitation: Excitation | None = None
     causes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -35,6 +35,7 @@ def _header(d: Deployment) -> str:
         "/* One tick. PVID_UPDATED or PVID_MISFIT: there is a new estimate; pvid_reason_text(reason) for others. */",
         f"pvid_reason {d.name}_step(const {d.sample_type} sample[{d.upper}_SAMPLES]);",
         "",
+        *_turning_declarations(d),
         "typedef struct {",
         f"    float value[{d.upper}_PARAMETERS];",
         f"    float standard_error[{d.upper}_PARAMETERS];",
@@ -136,6 +137,7 @@ def _source(d: Deployment) -> str:
         "",
         f'#include "{d.name}_design_{core}.h"',
         *([] if d.second is None else [f'#include "{d.name}_refined.h"']),
+        *(['#include "pvid/counter.h"'] if d.turning else []),
         *(f'#include "pvid/{one}_{d.arithmetic.header.removeprefix("pvid/")}"' for one in ("record", "snapshot")),
         "",
         "/* Names and units of the parameters. */",
@@ -155,6 +157,7 @@ def _source(d: Deployment) -> str:
         f"    return pvid_weak_step_{core}(&identifier, sample);",
         "}",
         "",
+        *_turning(d),
         f"bool {d.name}_result({d.name}_estimate *result)",
         "{",
         f"    pvid_estimate_{core} estimate;",
@@ -222,6 +225,47 @@ def _source(d: Deployment) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _turning_declarations(d: Deployment) -> list[str]:
+    return [
+        line
+        for one in d.turning
+        for line in (
+            f"/* sample[{one.place}] from the raw counter of its encoder [{one.lsb:.6g} a count], which starts over at",
+            " * modulus: 65536, 4000, or 0 for 2^32. The angle may turn without end: it is given to step about a",
+            " * reference that follows it. Call it once a tick, before step; not with a second stage. */",
+            f"float {d.name}_counted_{one.name}(uint32_t counter, uint32_t modulus);",
+            "",
+        )
+    ]
+
+
+def _turning(d: Deployment) -> list[str]:
+    """The samples of encoders that turn without end."""
+    return [
+        line
+        for one in d.turning
+        for line in (
+            f"float {d.name}_counted_{one.name}(uint32_t counter, uint32_t modulus)",
+            "{",
+            "    static uint32_t before;",
+            "    static uint32_t place; /* counts, modulo 2^32 */",
+            "    static uint32_t reference;",
+            "    place += (uint32_t)pvid_counter_way(before, counter, modulus);",
+            "    before = counter;",
+            "    const int32_t count = pvid_counter_way(reference, place, 0u);",
+            f"    const float angle = {float_literal(np.float32(one.lsb))} * (float)count;",
+            f"    if (((count <= {one.limit}) && (count >= -{one.limit})) ||",
+            f"        !pvid_weak_rebase_f32(&identifier, {one.place}u, {one.channel}u, angle)) {{",
+            "        return angle;",
+            "    }",
+            "    reference = place;",
+            "    return 0.0f;",
+            "}",
+            "",
+        )
+    ]
 
 
 def _begin(d: Deployment) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from pvid.configuration.excitation import Excitation
 from pvid.configuration.weak import Run, samples_of
 from pvid.core.weak_native import RefinedRecord
 from pvid.deploy.arithmetic import FIXED, FLOAT
-from pvid.deploy.deployment import Deployment, Playback, Quantity, SecondStage
+from pvid.deploy.deployment import Deployment, Playback, Quantity, SecondStage, Turning
 from pvid.model.compiled import CompiledModel
 from pvid.settings.enums import Reason
 from pvid.settings.record import Record
@@ -29,6 +29,7 @@ from pvid.settings.weak import Source, WeakConfig
 _MOST_NUMBERS = 30_000  # of the example's motion: 60 kB of flash
 _LONGER = 3  # half windows behind the first estimate
 _LARGEST = 30_000  # count of a signal without a resolution
+_TURNING = 2**15  # counts from the reference: a float32 has all of them in the sums of a block
 _PUBLISHED = (Reason.UPDATED, Reason.MISFIT)
 
 
@@ -94,6 +95,7 @@ def deployment_f32(
         first_s=config.ticks_needed / config.sample_rate,
         playback=playback,
         second=second,
+        turning=_turning(made, config, resolution),
         excitation=excitation,
         causes=config.causes,
     )
@@ -130,6 +132,18 @@ def deployment_q31(weak: WeakQ31, run: Run, command: str) -> Deployment:
         playback=_playback(counts, list(weak.lsb), record, design.hop * design.decimation, scale),
         causes=weak.config.causes,
     )
+
+
+def _turning(made: WeakFunctions, config: WeakConfig, resolution: Mapping[str, float]) -> tuple[Turning, ...]:
+    """Samples that may turn without end, of encoders whose count is known."""
+    found = []
+    for place, channel in made.turning.items():
+        name = made.samples[place]
+        lsb = resolution[name]
+        if lsb > 0:
+            reach = _TURNING * lsb if config.range is None else 0.5 * float(config.range[place])
+            found.append(Turning(name, place, channel, lsb, int(min(_TURNING, reach / lsb))))
+    return tuple(one for one in found if one.limit > 0)
 
 
 def _note(made: WeakFunctions, place: int) -> str:
