@@ -186,7 +186,8 @@ def _compared(answer: Answer, validation: Validation, key: str, how: str) -> Ite
     yield table(_HEADS, map(_row, validation.sensors))
     yield (
         '<p class="quiet">Of the motion: the difference over how far the sensor moves in a stretch (rms). Times the '
-        "noise: over the standard deviation of the noise that the rig states of the sensor; 1 is what that noise would leave.</p>"
+        "noise: over the standard deviation of the noise that the rig states of the sensor; 1 is what that noise "
+        "would leave.</p>"
     )
     height = answer_figure.height_of(validation)
 
