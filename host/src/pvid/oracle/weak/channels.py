@@ -270,14 +270,11 @@ class Channels:
             self._auxiliary(values, grid)
         arguments = [values[one] for one in self.plain]
         places, function = self._values_of(changed)
-        gains, integrands, count = like.gains.copy(), list(like.integrands), len(self.channels)
+        whole, count = [*like.gains, *like.integrands], len(self.channels)
         for place, x in zip(places, function(*arguments) if places else (), strict=True):
-            if place < count:
-                gains[place] = x
-            else:
-                integrands[place - count] = broadcast(x, grid.size)
+            whole[place] = broadcast(x, grid.size)
         fresh = sorted({place % count for place in places})
-        return Record(self, grid, gains, integrands, tuple(signs), arguments, (like, fresh))
+        return Record(self, grid, whole[:count], whole[count:], tuple(signs), arguments, (like, fresh))
 
     def record(self, grid: Grid, times: Mapping[Jet, float] | None = None) -> Record:
         """Values of all channels at the steps of a grid; `times`: with these jets so many times as large, but for the
@@ -294,7 +291,7 @@ class Channels:
         arguments = [values[one] for one in self.plain]
         whole = [broadcast(one, grid.size) for one in self._values(*arguments)]
         count = len(self.channels)
-        return Record(self, grid, np.array(whole[:count]), whole[count:], tuple(signs), arguments)
+        return Record(self, grid, whole[:count], whole[count:], tuple(signs), arguments)
 
     @cached_property
     def _sign_slopes(self) -> dict[sp.Expr, dict[Jet, sp.Expr]]:
@@ -391,7 +388,7 @@ class Record:
         self,
         channels: Channels,
         grid: Grid,
-        gains: Float,
+        gains: list[Float],
         integrands: list[Float],
         signs: tuple[reversals.Signs, ...],
         arguments: list[Float],
@@ -431,7 +428,7 @@ class Record:
         return cls(
             records[0].channels,
             Grid(grids[0].design, jets, raw, places, parts),
-            np.concatenate([one.gains[:, part] for one, part in zip(records, cut, strict=True)], axis=1),
+            [together(one.gains[k] for one in records) for k in range(len(records[0].gains))],
             [together(one.integrands[k] for one in records) for k in range(len(records[0].integrands))],
             tuple(reversals.joined([one.signs[k] for one in records], sizes) for k in range(len(records[0].signs))),
             [together(one.arguments[k] for one in records) for k in range(len(records[0].arguments))],
@@ -446,7 +443,7 @@ class Record:
         out = list(known) if of is functions else [np.zeros(0)] * len(self.gains)
         channels = self.channels.channels
         if plain := [k for k in fresh if channels[k].fold == 0]:
-            for k, one in zip(plain, functions.window_sums(self.gains[plain]), strict=True):
+            for k, one in zip(plain, functions.window_sums(np.array([self.gains[k] for k in plain])), strict=True):
                 out[k] = one
         for k in fresh:
             if channels[k].fold:

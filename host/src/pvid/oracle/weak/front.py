@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,7 @@ class Grid:
     raw : name -> samples as recorded, held ones filtered; NaN between segments
     places : sample of each step [n]
     parts : steps of each segment, all but the last whole half windows
+    given : name -> samples as they were given, of a run of one segment
     """
 
     design: WeakDesign
@@ -47,6 +48,7 @@ class Grid:
     raw: dict[str, Float]
     places: npt.NDArray[np.int64]
     parts: tuple[slice, ...]
+    given: dict[str, Float] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -65,12 +67,16 @@ class Grid:
 
 
 def with_jumps(
-    run: Mapping[str, npt.ArrayLike], made: Mapping[str, OfInput], sample_rate: float
+    run: Mapping[str, npt.ArrayLike], made: Mapping[str, OfInput], sample_rate: float, like: Grid | None = None
 ) -> dict[str, npt.ArrayLike]:
-    """A run with these signals of its inputs [n]; the first sample is also the one before it."""
+    """A run with these signals of its inputs [n]; the first sample is also the one before it. Those of an input that
+    another grid was given, too, are its own."""
     out = dict(run)
     for name, of in made.items():
         if of.name not in run:
+            continue
+        if like is not None and run[of.name] is like.given.get(of.name) and like.design.sample_rate == sample_rate:
+            out[name] = like.given[name]
             continue
         u = np.asarray(run[of.name], np.float64)
         before = np.concatenate([u[:1], u[:-1]])
@@ -107,7 +113,7 @@ def grid_of(
     needed : jets of signals
     like : another grid, from which a jet is taken that has the same samples and filter
     """
-    samples = samples_of(model, run)
+    samples, held = samples_of(model, run), {one.name for one in model.signals if one.hold == "zoh"}
     size = next(iter(samples.values())).size
     orders = {jet.order for jet in needed} | {0}
     margin = max(max(len(design.weights(order)) // 2 for order in orders), 2)
@@ -116,9 +122,10 @@ def grid_of(
         raise PvidError(
             f"{size} samples do not fill one window of {design.window_s:g} s: record longer or shorten the window"
         )
+    given = {} if like is None else like.given
     raw = {
-        signal.name: of_hold(samples[signal.name]) if signal.hold == "zoh" else samples[signal.name]
-        for signal in model.signals
+        name: like.raw[name] if like is not None and x is given.get(name) else of_hold(x) if name in held else x
+        for name, x in samples.items()
     }
     known = _in_common(like, raw, design, orders) if like is not None and np.array_equal(places, like.places) else {}
     jets = {
@@ -126,13 +133,14 @@ def grid_of(
         for jet in needed
         if jet.of in raw
     }
-    return Grid(design, jets, raw, places, (slice(0, len(places)),))
+    return Grid(design, jets, raw, places, (slice(0, len(places)),), samples)
 
 
 def _in_common(like: Grid, raw: Mapping[str, Float], design: WeakDesign, orders: set[int]) -> dict[Jet, Float]:
     """Jets of another grid with the same steps that these samples and this design have too."""
     filters = {one for one in orders if np.array_equal(design.weights(one), like.design.weights(one))}
-    names = {name for name, x in raw.items() if name in like.raw and np.array_equal(x, like.raw[name])}
+    shared = {name: x for name, x in raw.items() if name in like.raw}
+    names = {name for name, x in shared.items() if x is like.raw[name] or np.array_equal(x, like.raw[name])}
     return {jet: x for jet, x in like.jets.items() if jet.of in names and jet.order in filters}
 
 

@@ -163,7 +163,8 @@ def record_of(
     A model with an integral since the start of the run has one segment of each recording, its longest: behind a gap
     nobody knows the integral.
     """
-    whole = with_jumps(run, compiled.jumps, design.sample_rate)
+    last = like or compiled.channels.last
+    whole = with_jumps(run, compiled.jumps, design.sample_rate, None if last is None else last.grid)
     for number, name in enumerate(compiled.within):
         whole[name] = (np.asarray(run[NUMBER]) == number).astype(np.float64)
     samples = samples_of(compiled.model, whole)
@@ -171,13 +172,12 @@ def record_of(
     if any(one.has(Integral) for one in compiled.channels.opaque.values()):
         segments = longest_of_each(segments, run)
     size = len(next(iter(samples.values())))
-    last = like or compiled.channels.last
     if times is not None or (last is not None and last.grid.raw_size != size) or len(segments) > 1:
         last = None
     records, firsts = [], []
     refused = PvidError("no window of the run is whole: every one has a missing sample")
     for part in segments:
-        own = {name: values[part] for name, values in samples.items()}
+        own = samples if len(segments) == 1 and part == slice(0, size) else {k: x[part] for k, x in samples.items()}
         try:
             grid = grid_of(compiled.model, own, design, compiled.channels.needed, None if last is None else last.grid)
         except PvidError as error:
