@@ -90,6 +90,19 @@ FOREIGN = {
 IN_SI = {"ms": 1e-3, "us": 1e-6, "mm": 1e-3, "mA": 1e-3, "mV": 1e-3, "V": 1, "rev": 2 * np.pi, "deg": np.pi / 180}
 
 
+def test_commands_begin_as_the_caller_typed_pvid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "recorded.csv"
+    file.write_text("t,q\n" + "".join(f"{k / 50},{np.sin(k / 9)}\n" for k in range(400)))
+    for called, first in (
+        (None, "pvid"),
+        ("./tools/pvid", "./tools/pvid"),
+        ("/my clone/tools/pvid", "/my clone/tools/pvid"),
+    ):
+        monkeypatch.setenv("PVID_CALLED", called) if called else monkeypatch.delenv("PVID_CALLED", raising=False)
+        line = next(one for one in pvid("look", file).stdout.splitlines() if "--model" in one)
+        assert shlex.split(line) == [first, "identify", str(file), "--model", "free_pendulum"]
+
+
 @pytest.mark.parametrize("mechanism", ["dc_motor", "kapitza", "battery_2rc"])
 @pytest.mark.parametrize("foreign", [False, True])
 def test_the_command_that_is_printed_identifies(mechanism: str, foreign: bool, tmp_path: Path) -> None:

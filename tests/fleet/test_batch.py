@@ -85,8 +85,8 @@ def test_a_name_that_is_no_utf_8_is_written_escaped(tmp_path: Path) -> None:
 
 def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "fleet.parquet"
-    pattern = str(runs / "*" / "*.*")
-    done = pvid(tmp_path, "batch", pattern, "-o", str(out), "--set", "l1=0.3", "--workers", "2")
+    (runs / "a" / "remarks.md").write_text("of nobody")
+    done = pvid(tmp_path, "batch", str(runs), "-o", str(out), "--set", "l1=0.3", "--workers", "2")
     assert done.returncode == 0, done.stderr
     assert ": 2 of 3" in done.stdout and "failed: 1 of 3" in done.stdout
     assert "broken.csv, line 2, column y" in done.stderr
@@ -209,6 +209,7 @@ def test_wrong_usage_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)
     for arguments, words in (
         (["none/*.csv"], "no file has such a name"),
+        (["."], "no file in this folder can be a recording"),
         (["a.csv", "--set", "l1"], "write KEY=VALUE"),
     ):
         with pytest.raises(PvidError, match=words):

@@ -35,5 +35,8 @@ def test_run_of_240_samples_is_identified_without_halves() -> None:
 
 
 def test_run_of_50_samples_is_refused() -> None:
-    with pytest.raises(PvidError, match=r"the run of 50 samples \(0.5 s\) is too short for free_pendulum: record more"):
+    with pytest.raises(
+        PvidError, match=r"the run of 50 samples \(0.5 s\) is too short for .*, at least 220 \(2.2 s\)$"
+    ):
         chosen(ready(MODEL), {"q": SWING.run(0)["q"][:50]}, RATE)
+    assert np.isfinite(chosen(ready(MODEL), {"q": SWING.run(0)["q"][:220]}, RATE).window_s)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
+from pvid.model.together import with_own
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.design import WeakDesign
@@ -19,6 +20,7 @@ from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.reversals import located
 from pvid.oracle.weak.rows import EquationError, WeakRows
 from pvid.oracle.weak.solve import batch, error_of, online
+from pvid.oracle.weak.verdict import of_range
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
 
@@ -270,6 +272,23 @@ def test_windows_with_a_spike_are_left_out_and_reported() -> None:
     assert found.chi2 < 1.3
     clean = identify(sim.model, sim.run(0, SHARP), 1000.0, start=sim.truth, design=DESIGNS["cart_pendulum"])
     assert "left_out" not in [one.name for one in clean.verdict.reasons]
+
+
+def test_values_beyond_the_plausible_have_their_ranges_and_all_of_a_circle_is_plausible() -> None:
+    """The offset of an encoder within a sine; kapitza's stands outside of one."""
+    for name, offset in (("free_pendulum", "q0"), ("cart_pendulum", "c"), ("kapitza", "c")):
+        model = compiled_of(name)
+        p = np.array([one.guess for one in model.unknowns])
+        k = model.p_names.index(offset)
+        p[k] = 5.5
+        text = "Outside the range that the model calls plausible: c = 5.5 rad (-5 to 5 rad)."
+        assert [one.text for one in of_range(model, p)] == ([text] if name == "kapitza" else [])
+        own = with_own(model, (offset,), ("A", "B"))
+        both = np.array([one.guess for one in own.unknowns])
+        both[own.p_names.index(f"{offset}[B]")] = 5.5
+        assert len(of_range(own, both)) == int(name == "kapitza")
+        p[0] = 100 * model.unknowns[0].high
+        assert f"{model.p_names[0]} = " in of_range(model, p)[0].text
 
 
 def test_sentences_name_what_is_wrong_with_a_run() -> None:

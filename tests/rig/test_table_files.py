@@ -299,6 +299,21 @@ def test_numbers_are_read_in_every_style(case: str, tmp_path: Path) -> None:
     assert_same(table(tmp_path, content, columns), rtol=1e-12)
 
 
+def test_a_column_of_decimal_commas_is_read_where_the_file_groups_no_digits(tmp_path: Path) -> None:
+    """Behind a semicolon: 980 and 1000 beside 171,562, which alone can be 171562."""
+    found = table(tmp_path, of("t;F;x", *(f"{20 * k};{k + 1},250;{k + 2},375" for k in range(60))), "t=t:ms")
+    assert found.signals["F"][:2].tolist() == [1.25, 2.25] and found.signals["x"][-1] == 61.375
+
+
+def test_what_is_wrong_with_every_line_has_its_likely_cause(tmp_path: Path) -> None:
+    with pytest.raises(PvidError, match="one column alone: that of the time, t .s. or another name, is missing"):
+        table(tmp_path, of("x", *map(str, X)))
+    both = [f"{k + 7},1,25,7,5" for k in range(50)]
+    with pytest.raises(PvidError, match="5 columns where the header has 3, as if the comma separated columns and were"):
+        table(tmp_path, of(HEAD, *both))
+    assert "3 names for 5 columns, as if the comma" in table(tmp_path, of(HEAD, *both), "t=1,F=2,x=4").notes[0]
+
+
 @pytest.mark.parametrize(
     ("content", "parts"),
     [

@@ -119,7 +119,7 @@ def rig_of(name: str) -> str:
     """The shipped rig in words."""
     text = importlib.import_module(f"pvid.models.{name}.rig").__doc__
     assert text is not None
-    return f"The rig: {text[0].lower()}{' '.join(text[1:].split())}"
+    return f"The rig: {text[0].lower()}{' '.join(text.split())[1:]}"
 
 
 def gallery() -> str:

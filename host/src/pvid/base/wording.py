@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Iterable
+
+
+def typed_name() -> str:
+    """pvid as the caller typed it, for a shell: ./tools/pvid sets the variable."""
+    return shlex.quote(os.environ.get("PVID_CALLED") or "pvid")
 
 
 def shown(text: str, longest: int = 40) -> str:

@@ -69,15 +69,16 @@ def command(patterns: tuple[str, ...], **given: Any) -> int:
 
     pvid batch 'fleet/*/*.csv' --model dc_motor -o fleet.parquet
 
-    FILE may be a pattern in quotes: 'runs/*.csv', 'fleet/**/*.pvlog'. A second call with the same -o computes only what
-    is new or has changed, also after an interruption. The page shows what changed in the parameters of each board: a
-    board is the USB serial number of a log, or the folder of a run. With --report it has links to the reports of
-    `identify`. With --together the FILEs of a folder are recordings of one mechanism, which are identified together.
+    FILE may be a pattern in quotes, 'runs/*.csv' or 'fleet/**/*.pvlog', or a folder: all recordings in it. A second
+    call with the same -o computes only what is new or has changed, also after an interruption. The page shows what
+    changed in the parameters of each board: a board is the USB serial number of a log, or the folder of a run. With
+    --report it has links to the reports of `identify`. With --together the FILEs of a folder are recordings of one
+    mechanism, which are identified together.
 
     Exit code 1: a log is not equal to its twin. 4: a parameter changed by --alarm or more. 3: nothing was identified.
     """
     job = _Job.of(given, f"pvid batch {' '.join(patterns)}")
-    paths = _files(patterns)
+    paths = _files(patterns, job)
     fleet = job.done(paths)
     for name, count in fleet.counts.items():
         click.echo(f"{name}: {count} of {len(fleet.rows)}")
@@ -213,19 +214,10 @@ def _code(fleet: Fleet) -> int:
 
 def _settled(folder: Path, job: _Job, every: int) -> Iterator[dict[str, tuple[int, int]]]:
     """Recordings of a folder with their sizes and times, every so often, without those that are being written."""
-    from pvid.log.rig import LOG_SUFFIX
-    from pvid.rig.run import SUFFIXES
-
-    own = {Path(one).resolve() for one in (job.out, job.question.reports) if one is not None}
     before: dict[str, tuple[int, int]] = {}
     while True:
         now: dict[str, tuple[int, int]] = {}
-        for path in folder.rglob("*"):
-            if not path.name.lower().endswith((LOG_SUFFIX, *SUFFIXES)) or not path.is_file():
-                continue
-            whole = path.resolve()
-            if not own.isdisjoint([whole, *whole.parents]):
-                continue
+        for path in _recordings(folder, job):
             at = path.stat()
             now[str(path)] = (at.st_size, at.st_mtime_ns)
         old = time.time_ns() - every * 10**9
@@ -234,11 +226,28 @@ def _settled(folder: Path, job: _Job, every: int) -> Iterator[dict[str, tuple[in
         time.sleep(every)
 
 
-def _files(patterns: tuple[str, ...]) -> list[str]:
+def _recordings(folder: Path, job: _Job) -> Iterator[Path]:
+    """Files of a folder that can be recordings, but for those that the command writes."""
+    from pvid.log.rig import LOG_SUFFIX
+    from pvid.rig.run import SUFFIXES
+
+    own = {Path(one).resolve() for one in (job.out, job.question.reports) if one is not None}
+    for path in folder.rglob("*"):
+        whole = path.resolve()
+        if path.name.lower().endswith((LOG_SUFFIX, *SUFFIXES)) and path.is_file():
+            if own.isdisjoint([whole, *whole.parents]):
+                yield path
+
+
+def _files(patterns: tuple[str, ...], job: _Job) -> list[str]:
     found: list[str] = []
     for pattern in patterns:
         here = sorted(one for one in glob(pattern, recursive=True) if Path(one).is_file()) if has_magic(pattern) else []
         if has_magic(pattern) and not here:
             raise PvidError(f"{pattern}: no file has such a name")
+        if Path(pattern).is_dir():
+            here = sorted(map(str, _recordings(Path(pattern), job)))
+            if not here:
+                raise PvidError(f"{pattern}: no file in this folder can be a recording")
         found += here or [pattern]
     return found

@@ -15,6 +15,7 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import percent, with_prefix
+from pvid.base.wording import typed_name
 from pvid.board.design_cost import Asked, Cost, CostedDesign
 from pvid.board.target import HOST_TARGET, Verdict
 from pvid.board.verify_board import verify_recording
@@ -104,7 +105,7 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
     equal = _in_float(shown, target, figure)
     equal = _in_fixed_point(shown, target) and equal
     _by_the_paper(shown, seed)
-    click.echo(f"Picture: {figure}.  Your own recording: pvid identify FILE.csv --model MODEL")
+    click.echo(f"Picture: {figure}.  Your own recording: {typed_name()} identify FILE.csv --model MODEL")
     return DONE if equal else DIFFERENT
 
 

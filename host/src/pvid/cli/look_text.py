@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.wording import printable, with_unit
+from pvid.base.wording import printable, typed_name, with_unit
 from pvid.cli.input import print_notes
 from pvid.identification.survey import ColumnFacts, Proposal, Survey, lines_of_a_model, proposals
 
@@ -59,7 +59,7 @@ def _advice(survey: Survey) -> list[str]:
     file = str(survey.path)
     if not found:
         return [
-            "No mechanism of the list (`pvid models`) has these columns. Yours is a model file of ten lines "
+            f"No mechanism of the list (`{typed_name()} models`) has these columns. Yours is a model file of ten lines "
             "(host/docs/models.md). Its signals could be, in SI units:",
             *(f"    {line}" for line in lines_of_a_model(survey)),
         ]

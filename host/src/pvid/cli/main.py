@@ -23,7 +23,7 @@ from pvid.base.freed_memory import keep_freed
 from pvid.base.output import watch
 from pvid.base.packages import PACKAGES, installing
 from pvid.base.version import __version__
-from pvid.base.wording import reason, shown
+from pvid.base.wording import reason, shown, typed_name
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
     "Identify": {
@@ -77,7 +77,7 @@ def main() -> None:
     keep_freed()
     os.environ.pop("MPLBACKEND", None)  # figures are files here; a backend that is not installed would fail
     try:
-        code = commands.main(prog_name="pvid", standalone_mode=False)
+        code = commands.main(prog_name=typed_name(), complete_var="_PVID_COMPLETE", standalone_mode=False)
         sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())

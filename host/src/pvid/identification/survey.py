@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.units import Scale, scale_to, spelled
+from pvid.base.wording import typed_name
 from pvid.identification.wild_samples import MOST_FAR, far_from_median
 from pvid.models.mechanisms import described
 from pvid.models.registry import most_specific
@@ -333,7 +334,7 @@ class Proposal:
 
     def command(self, file: str) -> str:
         """What to type next; a constant that must be stated is 0.00 there."""
-        parts = ["pvid identify", shlex.quote(file), "--model", self.mechanism]
+        parts = [typed_name(), "identify", shlex.quote(file), "--model", self.mechanism]
         if self.columns:
             parts += ["--columns", self.columns]
         return " ".join([*parts, *(f"--set {name}=0.00" for name, _ in self.constants)])

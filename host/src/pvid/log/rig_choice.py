@@ -11,7 +11,7 @@ from typing import Any
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
-from pvid.base.wording import listed
+from pvid.base.wording import listed, typed_name
 from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log, named_in
 from pvid.model.description import Model
 from pvid.models.mechanisms import compiled_of
@@ -19,7 +19,14 @@ from pvid.models.mechanisms import described as description_of
 from pvid.models.registry import Mechanism, asked_for, is_named, most_specific, names, shipped
 from pvid.rig.columns import Columns, MissingColumnError, parsed
 from pvid.rig.former import translated
-from pvid.rig.mechanism_file import MechanismRig, channels_of, parsed_file, rig_path_of, with_settings
+from pvid.rig.mechanism_file import (
+    MechanismRig,
+    channels_of,
+    parsed_file,
+    refuse_other_keys,
+    rig_path_of,
+    with_settings,
+)
 from pvid.rig.run import is_run, read_recording
 
 
@@ -62,6 +69,7 @@ def rig_of(
     constants = {one.name: document.pop(one.name) for one in compiled.knowns if one.name in document}
     if constants:
         document = with_settings(document, [f"known.{key}={value}" for key, value in constants.items()])
+    refuse_other_keys(document, compiled)
     rig = MechanismRig.of_document(document, name)
     rig.refuse_lacking(compiled)
     return rig
@@ -141,7 +149,7 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
         return found[0]
     what = "the data" if run_path is None else str(run_path)
     if not found:
-        look = "" if run_path is None else "; pvid look shows what the file has"
+        look = "" if run_path is None else f"; {typed_name()} look shows what the file has"
         signals = [f"{name} ({', '.join(one.name for one in description_of(name).signals)})" for name in names()]
         raise PvidError(
             f"{what}: no shipped mechanism has these columns: name yours with --model, and its columns with --columns; "

@@ -123,7 +123,9 @@ class Evidence:
                 self.decimal[mark] += 1
 
 
-def styles(path: str, found: Mapping[str, Evidence], whole: bool = True) -> dict[str, Style] | None:
+def styles(
+    path: str, found: Mapping[str, Evidence], whole: bool = True, separator: str = ""
+) -> dict[str, Style] | None:
     """Of each column, by what all of them show.
 
     Parameters
@@ -131,6 +133,7 @@ def styles(path: str, found: Mapping[str, Evidence], whole: bool = True) -> dict
     path : of the file, for a refusal
     found : by name of a column
     whole : whether all cells were counted; else None is returned where more of them might decide otherwise
+    separator : of columns; with a semicolon a comma is a decimal sign where other numbers have no thousands separators
 
     Raises
     ------
@@ -147,6 +150,8 @@ def styles(path: str, found: Mapping[str, Evidence], whole: bool = True) -> dict
         if sure[name] is None and not known and one.either[","] and one.short and not one.long and one.round[","]
     }
     known |= set(mixed.values())
+    if not known and separator == ";" and any(one.long for one in found.values()):
+        known = {Style(",")}
     return {name: sure[name] or mixed.get(name) or _by_others(path, name, one, known) for name, one in found.items()}
 
 

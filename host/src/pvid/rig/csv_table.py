@@ -44,6 +44,7 @@ _DAMAGED_SHARE, _DAMAGED_LINES = 0.05, 3
 _EARLY = 1000  # and more than there are rows: the rest need not be read
 _SHOWN = 60  # characters of a line
 _FEW = 32  # lines: what numpy refuses is halved down to so many
+_COMMAS = ", as if the comma separated columns and were the decimal sign as well"
 _NO_NUMBER = (9.9e37, 9.91e37)  # an overload and no number in SCPI, the language of instruments
 
 _NO_DATA = re.compile(rb"(?m)^[ \t]*(?:[#%]|//|sep=)")
@@ -106,6 +107,9 @@ class _TextTable:
             raise PvidError(f"{path} is empty.")
         layout = _layout(lines, columns)
         if layout is None:
+            numbers = sum(is_number(line.strip()) for line in lines)
+            if 2 * numbers > sum(bool(line.strip()) for line in lines):
+                raise PvidError(f"{path} has one column alone: that of the time, t [s] or another name, is missing.")
             raise PvidError(f"{path} has no line of two numbers or more: this is no table.")
         self._layout = layout
         where = f", line {layout.header}" if layout.header else ""
@@ -139,7 +143,7 @@ class _TextTable:
         evidence = {self._columns[one].name: Evidence() for one in self._numbers}
         for signal in self._numbers:
             evidence[self._columns[signal].name].add(cells[self._places[signal]] for cells in self._sample)
-        found = styles(str(self._path), evidence, whole=False)
+        found = styles(str(self._path), evidence, False, self._layout.separator)
         try:
             if found is not None:
                 return self._table({one: found[self._columns[one].name] for one in self._numbers}, sampled=True)
@@ -159,7 +163,7 @@ class _TextTable:
             ]
             for signal in self._numbers:
                 evidence[self._columns[signal].name].add(cells[self._places[signal]] for cells in rows)
-        found = styles(str(self._path), evidence)
+        found = styles(str(self._path), evidence, separator=self._layout.separator)
         assert found is not None
         return found
 
@@ -235,7 +239,10 @@ def _front_note(lines: Sequence[str], layout: Layout) -> tuple[str, ...]:
     if not front:
         return notes
     at = f"line {front[0]}" if len(front) == 1 else f"{len(front)} lines up to line {front[-1]}"
-    return (f"left out in front of the table: {at}, {shown(lines[front[0] - 1].strip())}", *notes)
+    names = len(split(lines[front[0] - 1], layout.separator) or ())
+    doubled = layout.separator == "," and not layout.header and 1 < names < layout.width <= 2 * names
+    cause = f": {names} names for {layout.width} columns{_COMMAS}" if doubled else ""
+    return (f"left out in front of the table: {at}, {shown(lines[front[0] - 1].strip())}{cause}", *notes)
 
 
 def _from_line(block: bytes, count: int) -> bytes:
@@ -416,7 +423,9 @@ class _Reader:
                     continue
                 else:
                     if any(found):
-                        self._damage(number, lines.line(k), f"{len(found)} columns where the header has {layout.width}")
+                        more = layout.separator == "," and layout.width < len(found) <= 2 * layout.width
+                        cause = f"{len(found)} columns where the header has {layout.width}" + more * _COMMAS
+                        self._damage(number, lines.line(k), cause)
                     continue
             if found is None:
                 self._damage(number, lines.line(k), "a malformed line or quoted cell")

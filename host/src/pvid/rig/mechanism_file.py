@@ -34,6 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -114,9 +115,7 @@ class MechanismRig:
     @classmethod
     def of_document(cls, document: Mapping[str, Any], asked: Mechanism | None = None) -> MechanismRig:
         """From the tables of a text; see `parse`. `asked`: the mechanism of this call, in place of the text's."""
-        for key in document:
-            if key not in _KEYS:
-                raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(_KEYS)} are")
+        refuse_other_keys(document)
         model = _table(document, "model").get("name") if asked is None else asked
         if model is None or (asked is None and not isinstance(model, str)):
             raise PvidError('the mechanism is missing: [model] name = "dc_motor", or the path of a model file')
@@ -229,6 +228,35 @@ class MechanismRig:
             typed = " ".join(f"--set known.{one.name}={one.value:g}" for one in lacking)
             names = listed(f"{one.name} [{one.unit}]" if one.unit else one.name for one in lacking)
             raise PvidError(f"{names} of the rig is missing: use {typed} with the value of your rig")
+
+
+def refuse_other_keys(document: Mapping[str, Any], model: CompiledModel | None = None) -> None:
+    """PvidError where a key of a text is none, with those of the model that may be meant."""
+    for key in document:
+        if key in _KEYS:
+            continue
+        refusal = f"{shown(key)} is not a key of the rig file of a mechanism"
+        if model is None:
+            raise PvidError(f"{refusal}: {listed(_KEYS)} are")
+        outputs = [one.name for one in model.outputs]
+        known = {one.name: f"known.{one.name}" for one in model.knowns}
+        meant = {name: f"nominal.{name}" for name in (*model.p_names, *outputs)}
+        meant |= {one.name: f"sensor.{one.name}.resolution" for one in model.signals if one.kind != "input"}
+        if key in model.p_names or key in outputs:
+            raise PvidError(
+                f"{shown(key)} is no constant of {model.name} but is identified: nominal.{key} is its rough guess"
+            )
+        asked = ""
+        for names in (meant | {one: one for one in _KEYS}, known):  # a constant before others that are as near
+            folded = {name.casefold(): text for name, text in names.items()}
+            for name in get_close_matches(key.casefold(), folded, 1, 0.5):
+                asked = f": is {folded[name]} meant?"
+        constants = listed(known.values()) if known else "none"
+        guesses = listed(f"nominal.{name}" for name in (*model.p_names, *outputs))
+        raise PvidError(
+            f"{refusal}{asked}; constants of {model.name}: {constants}; rough guesses: {guesses}; others: "
+            f"{listed(one for one in _KEYS if one not in ('known', 'nominal'))}"
+        )
 
 
 def rig_path_of(run_path: Path) -> Path:

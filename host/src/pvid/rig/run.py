@@ -176,7 +176,7 @@ def read_table(path: Path, columns: Columns) -> Table:
     """The wanted columns of a file, before their clock is looked at; see `read_recording`."""
     try:
         if path.is_dir():
-            raise PvidError(f"{path} is a directory, not a recorded run.")
+            raise PvidError(f"{path} is a directory, not a recorded run: name its files, or use pvid batch.")
         if not path.exists():
             raise PvidError(f"{path} does not exist.")
         if not path.is_file():

@@ -8,6 +8,7 @@ the best by truth.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -268,7 +269,10 @@ def _ranked(
     if not tried:
         longest = max(parts, default=0)
         many = f"the run of {longest} samples ({longest / sample_rate:.3g} s)"
-        raise PvidError(f"{many} is too short for {model.model.name}: record more samples")
+        needed = math.ceil(_SHORTEST_STEPS * (at_least[-1] + 1) / 2)
+        least = "" if longest >= needed else f", at least {needed} ({needed / sample_rate:.3g} s)"
+        gap = "" if len(parts) < 2 else " without a gap"
+        raise PvidError(f"{many} is too short for {model.model.name}: record more samples{gap}{least}")
     best = min(tried, key=_order)
     if best.chi2 > MODEL_ERROR and equation_error:
         errors, of_sensors = True, tried[:]

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+import sympy as sp
 
 from pvid.base.rounding import percent
 from pvid.base.wording import listed, with_unit
@@ -444,16 +445,33 @@ def of_residuals(found: Uncertainty) -> list[Reason]:
 
 
 def of_range(model: CompiledModel, p: Float, found: Sequence[Judged] = ()) -> list[Reason]:
-    """Values beyond what the model calls plausible; of what is identified."""
+    """Values beyond what the model calls plausible; of what is identified. All of a circle is plausible."""
     out = [
         k
         for k, (one, value) in enumerate(zip(model.unknowns, p, strict=True))
         if one.high > one.low and not one.low <= value <= one.high and (not found or found[k].status == "identified")
+        if not is_circular(model, k)
     ]
     if not out:
         return []
-    text = f"Outside the range (low, high): {listed(model.p_names[k] for k in out)}."
+    values = (
+        f"{one.name} = {with_unit(p[k], one.unit, 3)} ({one.low:.3g} to {with_unit(one.high, one.unit, 3)})"
+        for k, one in ((k, model.unknowns[k]) for k in out)
+    )
+    text = f"Outside the range that the model calls plausible: {listed(values)}."
     return [Reason("range", text, of=of_some(model, out))]
+
+
+def is_circular(model: CompiledModel, k: int) -> bool:
+    """Whether an unknown is an angle of which every turn is the same to the equations, as the offset of an encoder
+    within a sine."""
+    one = model.unknowns[k]
+    if one.unit != "rad":
+        return False
+    own = {} if model.together is None else {new: old for of in model.together.own for old, new in of.items()}
+    symbol = own.get(one.symbol, one.symbol)
+    having = [equation for equation in model.equations if equation.has(symbol)]
+    return bool(having) and all(equation.subs(symbol, symbol + 2 * sp.pi) == equation for equation in having)
 
 
 def of_spoiled(rows: WeakRows, fit: Fit) -> list[Reason]:
