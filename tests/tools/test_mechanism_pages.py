@@ -24,6 +24,10 @@ def test_a_page_shows_the_mechanism_as_it_is(name: str) -> None:
     assert (DOCS / "images" / "mechanisms" / f"{name}.png").is_file()
 
 
+def test_the_rig_is_in_words() -> None:
+    assert rig_of("dc_motor").startswith("The rig: a 12 V brush motor with ")
+
+
 def test_the_gallery_has_every_mechanism() -> None:
     text = (DOCS / "mechanisms" / "gallery.md").read_text(encoding="utf-8")
     assert text == gallery(), "write it anew: ./tools/pvid bench pages"
