@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pvid.base.rounding import prefix_of, with_error
+from pvid.base.rounding import part_of_one, percent, prefix_of, with_error
 
 
 @pytest.mark.parametrize(
@@ -38,3 +38,8 @@ def test_a_unit_takes_the_prefix_of_the_largest_number(size: float, unit: str, s
 )
 def test_a_value_is_shown_to_the_second_digit_of_its_error(value: float, error: float, shown: tuple[str, str]) -> None:
     assert with_error(value, error) == shown
+
+
+def test_a_part_beyond_all_measure_has_no_digits() -> None:
+    assert (percent(0.00312), percent(5.91), percent(1e300)) == ("0.31 %", "591 %", "more than 10000 %")
+    assert (part_of_one(0.99, 3), part_of_one(-3.5, 3), part_of_one(-1e300, 3)) == ("0.990", "-3.500", "below -100")

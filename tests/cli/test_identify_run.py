@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,9 @@ from rich.console import Console
 from pvid.base import console
 from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
+from pvid.cli.identify_run import table_of
 from pvid.cli.main import commands
+from pvid.identification.answer import Value
 from pvid.models.mechanisms import names
 
 TRUTH = {"R": 1.2, "L": 3e-3, "k": 0.05, "J": 2e-4, "b": 1e-4, "Tc": 0.012, "i0": 0.03}
@@ -41,6 +44,13 @@ model.equation(theta.d(2) + b * theta.d() + w * sin(theta))
 def pvid(*arguments: str | Path) -> Result:
     """A command in this process; a refusal raises."""
     return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
+
+
+def test_a_table_of_80_columns_loses_no_letter() -> None:
+    one = Value("N*m/A", 7.811e-07, 7.8e-09, se_noise=4.1e-09, se_scale=7.8e-09, se_model=6.5e-09, word="not_explained")
+    shown = StringIO()
+    Console(file=shown, width=80).print(table_of({"k": one, "torque": replace(one, word="not_identified")}, "motor"))
+    assert "…" not in shown.getvalue() and "not_identified" in shown.getvalue() and "7.811" in shown.getvalue()
 
 
 @pytest.fixture(scope="module")

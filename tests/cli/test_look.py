@@ -103,6 +103,22 @@ def test_commands_begin_as_the_caller_typed_pvid(tmp_path: Path, monkeypatch: py
         assert shlex.split(line) == [first, "identify", str(file), "--model", "free_pendulum"]
 
 
+def test_a_mechanism_that_ignores_a_drive_is_not_taken_silently(tmp_path: Path) -> None:
+    """A motor without its current: the one that runs out has the other columns."""
+    file = tmp_path / "recorded.csv"
+    file.write_text("t,V,phi\n" + "".join(f"{k / 1000},{k % 7},{np.sin(k / 99)}\n" for k in range(400)))
+    clause = "column V is not used: dc_motor needs i as well"
+    assert f"    but {clause}" in pvid("look", file).stdout.splitlines()
+    with pytest.raises(
+        PvidError, match=f"has the columns of coasting_motor, but {clause}: name the mechanism with --model"
+    ):
+        pvid("identify", file)
+    with pytest.raises(PvidError, match="J .* of the rig is missing"):
+        pvid("identify", file, "--model", "coasting_motor")
+    file.write_text(file.read_text().replace("t,V,", "t,W,"))
+    assert "not used" not in pvid("look", file).stdout
+
+
 @pytest.mark.parametrize("mechanism", ["dc_motor", "kapitza", "battery_2rc"])
 @pytest.mark.parametrize("foreign", [False, True])
 def test_the_command_that_is_printed_identifies(mechanism: str, foreign: bool, tmp_path: Path) -> None:

@@ -54,9 +54,21 @@ def test_two_recordings_are_compared_with_all_but_scale() -> None:
 
 def test_the_mean_is_since_the_last_step_and_not_below_what_recordings_share() -> None:
     value = np.where(np.arange(20) < 12, 10.0, 11.0) + np.random.default_rng(1).normal(0, NOISE, 20)
-    mean, se = series(value).mean
+    mean, se = series(value).latest
     assert abs(mean - 11) < 4 * NOISE / 8**0.5 and 0.048 < se < 0.051
-    assert series(value, apart=NOISE).mean[1] < 2 * NOISE / 8**0.5
+    assert series(value, apart=NOISE).latest[1] < 2 * NOISE / 8**0.5
+
+
+def test_the_latest_value_of_a_trend_is_its_end_with_the_error_of_a_line() -> None:
+    """Standard error at the end of a line through n points: 2 sigma / sqrt(n) for many."""
+    draws = []
+    for seed in range(80):
+        value = 10.0 + 0.3 * np.arange(20) + np.random.default_rng(seed).normal(0, NOISE, 20)
+        (one,) = series(value).changes
+        assert one.kind == "trend"
+        end, se = series(value, apart=NOISE).latest
+        draws.append((end - 15.7) / se)
+    assert 0.75 < np.std(draws) < 1.25 and abs(np.mean(draws)) < 0.4  # 80 draws: 0.08 and 0.11
 
 
 def fleet(**other: Any) -> list[Row]:

@@ -51,6 +51,13 @@ def test_rate_too_low_for_the_current_is_named_in_place_of_its_consequences(rate
     assert not {"feedback", "sensor", "missing", "friction"} & set(found)
 
 
+def test_no_rate_is_advised_where_the_equations_explain_nothing() -> None:
+    """An angle of the opposite sign: the time constant is that of no motor."""
+    found = motor(1000.0, lambda run: {"phi": -run["phi"]})
+    assert "hardly identifiable" in found["rate"] and "Sample at" not in found["rate"]
+    assert re.search(r"the standard error of L is [\d.]+ H, beside a value of [\d.]+ H", found["not_identified"])
+
+
 def test_rate_that_shows_the_current_is_not_named() -> None:
     assert "rate" not in motor(1000.0)
 

@@ -6,6 +6,7 @@ import math
 
 _MOST_DECIMALS = 6
 _FIXED = (1e-3, 1e4, 9)  # values without an exponent, and the decimals that they have at most
+_MOST_PERCENT = 10_000
 _MOST_ZEROS = 4  # that stand in front of the point for digits that are not known
 
 
@@ -26,9 +27,16 @@ def with_error(value: float, error: float) -> tuple[str, str]:
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
+def part_of_one(r2: float, decimals: int) -> str:
+    """R^2, which has no digits where predictions are far worse than none."""
+    return f"{r2:.{decimals}f}" if r2 >= -_MOST_PERCENT / 100 else f"below -{_MOST_PERCENT // 100}"
+
+
 def percent(part: float) -> str:
-    """A part of 1 to two digits: 0.00312 is "0.31 %"."""
+    """A part of 1 to two digits: 0.00312 is "0.31 %"; what is beyond all measure has no digits."""
     shown = 100.0 * part
+    if shown > _MOST_PERCENT:
+        return f"more than {_MOST_PERCENT} %"
     return f"{shown:.2g} %" if abs(shown) < 100.0 else f"{shown:.0f} %"
 
 

@@ -41,4 +41,9 @@ def in_utf8(text: str) -> str:
 
 def with_unit(value: float, unit: str, digits: int) -> str:
     """``0.0046 rad``: a number of so many digits, with its unit where it has one."""
-    return f"{value:.{digits}g} {unit}".rstrip()
+    return f"{in_digits(value, digits)} {unit}".rstrip()
+
+
+def in_digits(value: float, digits: int) -> str:
+    """A number rounded to so many digits, without an exponent from 0.0001 to 999999: ``120``."""
+    return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, working, write_stderr
@@ -406,7 +406,9 @@ def table_of(values: Mapping[str, Value], title: str) -> Table:
     large = {name: of for name, of in large.items() if any(_is_large(one, of) for one in values.values())}
     doubted = any(one.word != "good" for one in values.values())
     names = ("parameter", "estimate", "standard error", *(["from noise", *large] if large else []))
-    table = Table(*names, *(["verdict"] if doubted else []), title=title, min_width=len(title))
+    table = Table(*names, *([Column("verdict", no_wrap=True)] if doubted else []), title=title, min_width=len(title))
+    for column in table.columns[: len(names)]:
+        column.overflow = "fold"
     for column in table.columns[1 : len(names)]:
         column.justify = "right"
     for name, one in values.items():

@@ -13,6 +13,7 @@ from rich.table import Table
 from pvid.base.wording import printable, typed_name, with_unit
 from pvid.cli.input import print_notes
 from pvid.identification.survey import ColumnFacts, Proposal, Survey, lines_of_a_model, proposals
+from pvid.models.mechanisms import unused_input
 
 _DIGITS = 4
 _MOST = 4  # proposals
@@ -66,6 +67,8 @@ def _advice(survey: Survey) -> list[str]:
     lines = ["By names and units it can be:" if len(found) > 1 else "By names and units it is:"]
     for one in found[:_MOST]:
         lines += [f"  {one.title}", f"    {one.command(file)}", *_constants(one)]
+        if unused := unused_input(one.mechanism, survey.names):
+            lines.append(f"    but {unused}")
     lines.append("Another mechanism is a model file of ten lines: host/docs/models.md.")
     return lines
 

@@ -144,16 +144,19 @@ class Series:
             yield Change("step", float(self.t[mark - 1]), float(self.t[mark]), before, after)
 
     @property
-    def mean(self) -> tuple[float, float]:
-        """Over the recordings since the last step, and its standard error without scale: of the noise and the scatter,
-        and not below the part that they may share [unit]."""
+    def latest(self) -> tuple[float, float]:
+        """The mean over the recordings since the last step, or the end of their trend, and its standard error without
+        scale: of the noise and the scatter, and not below the part that they may share [unit]."""
         steps = [one.end for one in self.changes if one.kind == "step"]
         since = self.t >= (steps[-1] if steps else self.t[0])
         v, w = self.value[since], self.noise[since] ** -2.0
-        mean = float(np.average(v, weights=w))
-        scatter = float(w @ (v - mean) ** 2) / max(1, v.size - 1)
+        trend = any(one.kind == "trend" and one.end == self.t[-1] for one in self.changes)
+        columns = np.stack([np.ones(v.size), *([self.t[since] - self.t[-1]] if trend else [])], axis=1)
+        inverse = np.linalg.inv(columns.T @ (w[:, None] * columns))
+        line = inverse @ (columns.T @ (w * v))
+        scatter = float(w @ (v - columns @ line) ** 2) / max(1, v.size - line.size)
         shared = float(np.sqrt(np.maximum(0.0, self.apart[since] ** 2 - 1 / w)).min())
-        return mean, float(np.hypot((max(1.0, scatter) / w.sum()) ** 0.5, shared))
+        return float(line[0]), float(np.hypot((max(1.0, scatter) * inverse[0, 0]) ** 0.5, shared))
 
 
 def series_of(rows: Sequence[Row]) -> list[Series]:

@@ -114,8 +114,8 @@ def page(fleet: Fleet, command: str, folder: Path | None = None, *, refresh: int
         _figure(fleet) if fleet.series else "",
         *_common(fleet),
         "<h2>Parameters</h2>",
-        "<p>Mean since the last step, with its standard error by noise, scatter and what the equations lack; without "
-        "the errors of scale that all recordings have in common.</p>",
+        "<p>Mean since the last step, or the value at the end of a trend, with its standard error by noise, scatter "
+        "and what the equations lack; without the errors of scale that all recordings have in common.</p>",
         _means(fleet),
         "<h2>Recordings</h2>",
         _recordings(fleet, folder or Path()),
@@ -176,20 +176,22 @@ def _means(fleet: Fleet) -> str:
         return "<p>None.</p>"
     boards: dict[str, dict[str, str]] = {}
     heads: dict[str, str] = {}
-    for name, own in _by_parameter(fleet.series).items():
+    for name, own in _by_parameter(fleet).items():
         unit, scale = _scale(own)
         heads[name] = f"{name} [{unit}]" if unit else name
         for one in own:
-            value, se = one.mean
+            value, se = one.latest
             boards.setdefault(one.board, {})[name] = " ± ".join(with_prefix(value / scale, se / scale, "")[:2])
     lines = [[text(board), *(text(of.get(name, "-")) for name in heads)] for board, of in sorted(boards.items())]
     return table(("board", *map(text, heads.values())), lines, numbers=len(heads) + 1)
 
 
-def _by_parameter(series: Sequence[Series]) -> dict[str, list[Series]]:
-    out: dict[str, list[Series]] = {}
-    for one in series:
-        out.setdefault(one.name, []).append(one)
+def _by_parameter(fleet: Fleet) -> dict[str, list[Series]]:
+    """Those that changed first, as they are named."""
+    changed = [one for one, _ in (*fleet.changes(alarms=True), *fleet.changes(alarms=False))]
+    out: dict[str, list[Series]] = {one.name: [] for one in (*changed, *fleet.series)}
+    for one in fleet.series:
+        out[one.name].append(one)
     return out
 
 
@@ -220,7 +222,7 @@ def _recordings(fleet: Fleet, folder: Path) -> str:
 
 def _figure(fleet: Fleet) -> str:
     """A panel for each parameter: value and error without scale over the date."""
-    parameters = _by_parameter(fleet.series)
+    parameters = _by_parameter(fleet)
     boards = list(dict.fromkeys(one.board for one in fleet.series))
     changed = list(dict.fromkeys(series.board for series, _ in fleet.changes(alarms=True)))
     colored = (boards if len(boards) <= _MOST_COLORS else changed)[:_MOST_COLORS]

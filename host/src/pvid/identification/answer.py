@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.rounding import part_of_one
 from pvid.base.wording import listed
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.compiled import CompiledModel
@@ -300,7 +301,7 @@ class Analysis(Answer):
     def lines(self) -> list[str]:
         """Residuals, the refinement, and the prediction."""
         found = self.found
-        explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
+        explained = ", ".join(f"{name} {part_of_one(value, 6)}" for name, value in found.r2.items())
         of_weak = "" if self.stage == "weak form" else "weak form: "
         lines = [
             f"verdict {found.verdict.word}; {of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "

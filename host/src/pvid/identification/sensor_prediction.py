@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from pvid.base.rounding import percent
+from pvid.base.rounding import part_of_one, percent
 from pvid.base.wording import with_unit
 
 
@@ -35,7 +35,9 @@ class SensorPrediction:
     def __str__(self) -> str:
         noise = "" if self.of_noise is None else f", {self.of_noise:.2g} times the sensor's noise"
         rms = with_unit(self.rms, self.unit, 2)
-        return f"{self.name} to {percent(self.of_motion)} of its motion (rms {rms}{noise}; R^2 {self.r2:.5f})"
+        return (
+            f"{self.name} to {percent(self.of_motion)} of its motion (rms {rms}{noise}; R^2 {part_of_one(self.r2, 5)})"
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Its entry in a JSON object."""

@@ -26,7 +26,7 @@ from pvid.rig.mechanism_file import MechanismRig, rig_path_of
 
 VERDICTS: dict[Word, tuple[str, str]] = {
     "good": ("Good", "The values can be used."),
-    "usable": ("Usable", "The values can be used with care: read the reasons for doubt below."),
+    "usable": ("Usable", "The values can be used with care: read the warnings and notes below."),
     "not_explained": (
         "Not explained",
         "Do not use the values: the equations do not explain this recording. What seems to be missing is below.",

@@ -14,7 +14,7 @@ from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed, typed_name
 from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log, named_in
 from pvid.model.description import Model
-from pvid.models.mechanisms import compiled_of
+from pvid.models.mechanisms import compiled_of, unused_input
 from pvid.models.mechanisms import described as description_of
 from pvid.models.registry import Mechanism, asked_for, is_named, most_specific, names, shipped
 from pvid.rig.columns import Columns, MissingColumnError, parsed
@@ -130,6 +130,7 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
         raise PvidError(f"no mechanism is named: use --model, with {listed(names(), 'or')}, or a model file")
     columns_of: dict[str, set[str]] = {}
     wrong: dict[str, PvidError] = {}
+    there: tuple[str, ...] = ()
     for name in names():
         try:
             wanted = parsed(columns, channels_of(description_of(name)))
@@ -137,7 +138,8 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
             continue
         try:
             read(wanted)
-        except MissingColumnError:
+        except MissingColumnError as error:
+            there = error.names
             continue
         except PvidError as error:  # it has the columns, and something else is wrong
             wrong[name] = error
@@ -145,9 +147,14 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
     found = most_specific(columns_of)
     if len(found) > 1 and all(name in wrong for name in found):  # of the file, whatever its mechanism is
         raise wrong[found[0]]
-    if len(found) == 1:
-        return found[0]
     what = "the data" if run_path is None else str(run_path)
+    if len(found) == 1:
+        if unused := unused_input(found[0], there):
+            raise PvidError(
+                f"{what} has the columns of {found[0]}, but {unused}: name the mechanism with --model, and its columns "
+                "with --columns"
+            )
+        return found[0]
     if not found:
         look = "" if run_path is None else f"; {typed_name()} look shows what the file has"
         signals = [f"{name} ({', '.join(one.name for one in description_of(name).signals)})" for name in names()]

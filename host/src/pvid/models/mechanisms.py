@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary
 
 from pvid import model as language
 from pvid.base.errors import PvidError
-from pvid.base.wording import printable
+from pvid.base.wording import listed, printable
 from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
 from pvid.model.refusal import ModelError, Place
@@ -54,6 +54,21 @@ def described(mechanism: Mechanism) -> Model:
     """
     path = path_of(mechanism)[1]
     return _left_in(_space_of(path), path)[1]
+
+
+def unused_input(mechanism: str, columns: Collection[str]) -> str:
+    """A clause on a column that a shipped mechanism does not use, and that drives another one with all its signals;
+    "": there is none."""
+    own = {one.name for one in described(mechanism).signals}
+    for name in names():
+        signals = described(name).signals
+        if own < {one.name for one in signals}:
+            unused = [one.name for one in signals if one.kind == "input" and one.name in set(columns) - own]
+            lacking = [one.name for one in signals if one.name not in columns]
+            if unused and lacking:
+                many = "column {} is" if len(unused) == 1 else "columns {} are"
+                return f"{many.format(listed(unused))} not used: {name} needs {listed(lacking)} as well"
+    return ""
 
 
 def text_with(mechanism: Mechanism, lines: Sequence[str]) -> str:

@@ -172,7 +172,7 @@ _HEADS = ("sensor", "rms difference", "of the motion", "times the noise")
 def _row(one: SensorPrediction) -> list[str]:
     unit, scale = prefixed(one.rms, one.unit)
     noise = "" if one.of_noise is None else f"{one.of_noise:.2g}" if one.of_noise < 100 else f"{one.of_noise:.0f}"
-    return [text(one.name), f"{one.rms / scale:.2g} {text(printed_unit(unit))}", percent(one.of_motion), noise]
+    return [text(one.name), text(with_unit(one.rms / scale, printed_unit(unit), 2)), percent(one.of_motion), noise]
 
 
 def _compared(answer: Answer, validation: Validation, key: str, how: str) -> Iterator[str]:
@@ -208,7 +208,7 @@ def _parts_of_errors(answer: Answer) -> str:
         whole = sum(shares) or 1.0
         unit, scale = prefixed(REACH * whole**0.5, one.unit)
         sizes = [
-            f"{REACH * share**0.5 / scale:.2g} {text(printed_unit(unit))}"
+            text(with_unit(REACH * share**0.5 / scale, printed_unit(unit), 2))
             if has_0(one)
             else percent(REACH * share**0.5 / abs(one.value or 1.0))
             for share in shares

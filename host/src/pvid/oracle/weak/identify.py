@@ -336,7 +336,7 @@ def _checks(
 
     return {
         "the search": lambda: verdict.settled(fit),
-        "the samples": lambda: of_samples(bare, run, design.sample_rate, fit),
+        "the samples": lambda: of_samples(bare, run, design.sample_rate, fit, min(found.r2)),
         "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
         "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
         "feedback": lambda: of_feedback(bare, run, fit, own.known),

@@ -35,6 +35,7 @@ _RESTS = 0.2  # of the run
 
 _FASTEST = 1.0  # rate of the fastest mode at the estimate, over the sample rate: above, it passes within a sample
 _FAST_GUESS = 0.3  # the same at the guesses, which must agree
+_EXPLAINED = 0.5  # R^2 of every equation, from which on another rate is advised
 _RULE = 20.0  # samples in the shortest time constant that are recommended
 _PART_OF_SAMPLE = 0.45  # a delay below it may come of such a mode
 _SENSITIVE = 0.3  # d log rate / d log of a parameter of the highest derivatives that the mode contains
@@ -42,7 +43,9 @@ _SENSITIVE = 0.3  # d log rate / d log of a parameter of the highest derivatives
 _FACTOR, _SPREAD = 8.0, 2.0  # common to the parameters of an equation, and between them
 
 
-def of_samples(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float, fit: Fit) -> list[Reason]:
+def of_samples(
+    model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float, fit: Fit, r2: float
+) -> list[Reason]:
     """Of all checks.
 
     Parameters
@@ -50,9 +53,10 @@ def of_samples(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_ra
     run : name of each signal -> samples [n]; NaN where one is missing
     sample_rate : [Hz]
     fit : the estimate
+    r2 : the least of the row kinds: where it is small, a time constant is that of no mechanism
     """
     samples = {one.name: np.asarray(run[one.name], np.float64) for one in model.signals}
-    out = too_slow(model, samples, sample_rate, fit)
+    out = too_slow(model, samples, sample_rate, fit, r2 > _EXPLAINED)
     for one in model.signals:
         if one.kind == "sensor":
             out += clipped(model, one, samples) + toggling(model, one, samples[one.name])
@@ -133,7 +137,9 @@ def _in_signs(psi: sp.Expr) -> set[Jet]:
     return {jet for one in sp.sympify(psi).atoms(sp.Function) if type(one).__name__ == "sgn" for jet in one.atoms(Jet)}
 
 
-def too_slow(model: CompiledModel, samples: Mapping[str, Float], rate: float, fit: Fit) -> list[Reason]:
+def too_slow(
+    model: CompiledModel, samples: Mapping[str, Float], rate: float, fit: Fit, is_explained: bool
+) -> list[Reason]:
     """The fastest mode of the equations passes within a sample: parameters of its highest derivative are lost. Of
     several recordings with own parameters, the modes are those of the first."""
     p = fit.p[list(model.places[0])]
@@ -157,9 +163,9 @@ def too_slow(model: CompiledModel, samples: Mapping[str, Float], rate: float, fi
     many, verb = ("their", "are") if len(lost) > 1 else ("its", "is")
     text = (
         f"{listed(lost)} {verb} hardly identifiable at {rate:.4g} Hz: {many} time constant is "
-        f"{with_unit(1 / fastest, 's', 2)}, and a sample takes {with_unit(1 / rate, 's', 2)}. "
-        f"Sample at {wanted:.6g} Hz."
+        f"{with_unit(1 / fastest, 's', 2)}, and a sample takes {with_unit(1 / rate, 's', 2)}."
     )
+    text += f" Sample at {wanted:.6g} Hz." if is_explained else ""
     return [Reason("rate", text)]
 
 

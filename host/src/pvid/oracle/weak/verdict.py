@@ -210,7 +210,8 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
             why = (
                 "the search takes {} to 0"
                 if ran_down
-                else "the standard error of {} is " + with_unit(se[k], one.unit, 2)
+                else f"the standard error of {{}} is {with_unit(se[k], one.unit, 2)}, "
+                f"beside a value of {with_unit(p, one.unit, 2)}"
             )
             out.append(Judged("not_identified", why.format(one.name)))
         elif own_scale and se[k] > UNKNOWN * abs(p):
