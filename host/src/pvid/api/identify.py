@@ -82,10 +82,26 @@ def identify(
     --------
     >>> pvid.identify("run.csv", l1=0.25)["g"].value  # doctest: +SKIP
     """
-    # Matrices are small: threads would wait for each other, on all cores.
-    with words_of_python(), threadpool_limits(limits=1, user_api="blas"):
+    with words_of_python():
         given = {**(settings or {}), **keys}
-        return _identify(data, model, rig, columns_text(columns), core, refine, given, own, shared)
+        return identify_typed(data, model, rig, columns_text(columns), core, refine, given, own, shared)
+
+
+def identify_typed(
+    data: Data | Sequence[Data],
+    model: str | os.PathLike[str] | Model | None,
+    rig: str | os.PathLike[str] | None,
+    columns: str | None,
+    core: Literal["f32", "q31", "f64"] | None,
+    refine: bool | None,
+    settings: Mapping[str, Any],
+    own: Sequence[str],
+    shared: Sequence[str],
+) -> Result:
+    """As `identify`; refusals name the options of the command line."""
+    # Matrices are small: threads would wait for each other, on all cores.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _identify(data, model, rig, columns, core, refine, settings, own, shared)
 
 
 def _identify(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from pvid.api.identify import identify
+from pvid.api.identify import identify_typed
 from pvid.api.result import Result
 from pvid.base.errors import PvidError
 from pvid.base.version import __version__
@@ -124,15 +124,17 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
     except (OSError, PvidError) as error:
         return Row(key, path, str(place.parent), 0.0, failure=_told(error), took=time.monotonic() - start)
     try:
-        result = identify(
-            places if len(places) > 1 else place,
-            model=question.model,
-            rig=question.rig,
-            columns=question.columns,
-            core=question.core,
-            settings=question.settings,
-            own=question.own if len(places) > 1 else (),
-            shared=question.shared if len(places) > 1 else (),
+        several = len(places) > 1
+        result = identify_typed(
+            places if several else place,
+            question.model,
+            question.rig,
+            question.columns,
+            question.core,
+            None,
+            question.settings,
+            question.own if several else (),
+            question.shared if several else (),
         )
         report = None if question.reports is None else _reported(result, question.reports, Path(path), key)
     except (PvidError, OSError) as error:
@@ -146,7 +148,7 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
         result.identified,
         result.verdict,
         result.status,
-        result.warning,
+        result.details["warning"],
         _all_verified(places, question) if question.verify else None,
         parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
         took=time.monotonic() - start,
