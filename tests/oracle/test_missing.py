@@ -367,6 +367,13 @@ def test_delay_is_named_with_what_explains_the_run_alike(samples: float) -> None
     assert named is not None and 0.85 * delay < float(named[1]) < 1.4 * delay
 
 
+def test_a_term_that_stood_in_for_a_later_one_is_dropped() -> None:
+    """A sensor whose samples are held for two ticks is late by half of one; i.d(2) explained most to first order."""
+    held = next(one for one in effects_of("servo") if one.name == "held samples (q)")
+    (term,) = outcome(PLANTS["servo"], 9002 * 100_003 + 21, (held, 1.912)).named
+    assert term.where == "q" and "delayed" in term.text and term.size == pytest.approx(0.0005, rel=0.1)
+
+
 def test_what_no_term_explains_has_no_name() -> None:
     """A resistance that is larger for one direction of the current is no term that is tried."""
     found = cell(lambda run: {"v": run["v"] - 0.002 * np.maximum(run["i"], 0.0)})

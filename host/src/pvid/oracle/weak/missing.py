@@ -50,6 +50,7 @@ _RIVAL = 0.9  # of the best gain of likelihood
 _CHANGES = 0.5  # the same of what changes: its course is one of few, and what that leaves is no sign against another
 _EQUAL = 0.9999  # of the best gain: the same column
 _MOST_RIVALS = 5
+_STAND_IN = 1.5  # times the chi^2 that is left with a term: without it no more is left, as it stood in for a later one
 _NOISE, _NOTICED = 2.0, 1.5  # chi^2 that is the sensors'; from which a term that explains much is looked for
 # Of the residuals beyond it: a law that imitates the missing one explains half to nine tenths of them.
 _ALL, MOST = 0.95, 0.9
@@ -240,10 +241,12 @@ def explained(library: Library, found: Missing) -> Explained:
             if (group[0].family in families if group in distinct else one.share > nearly(one) * best[0].share)
             and one.family not in tried
         ]
+        if not complete:
+            named.append(Named(chosen, _error_of(library, chosen, fit), tuple(rivals[:_MOST_RIVALS])))
+            named, fit = _without_superfluous(library, named, fit)
         found = Missing.of(library, uncertainty(fit).se, fit)
         if not complete:
             with_named, left = fit, chi2_of_sensors(fit)
-            named.append(Named(chosen, _error_of(library, chosen, fit), tuple(rivals[:_MOST_RIVALS])))
             share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
             few = len(named) < _MOST_TERMS  # three terms imitate much
             changes = any(isinstance(one.chosen.kind, Course) for one in named)  # imitates what follows the amplitude
@@ -252,6 +255,22 @@ def explained(library: Library, found: Missing) -> Explained:
         if complete and not found.visible.any():
             break
     return Explained(tuple(named), with_named, fit, share, complete)
+
+
+def _without_superfluous(library: Library, named: list[Named], fit: Fit) -> tuple[list[Named], Fit]:
+    """Terms without those that only stood in for the last one: without them next to nothing more is left."""
+    for one in named[:-1]:
+        others, without = [other for other in named if other is not one], library.fit
+        for place, other in enumerate(others):
+            again = _refitted(library, without, other.chosen)
+            if again is None:
+                break
+            others[place], without = replace(other, chosen=again[0]), again[1]
+        else:
+            if chi2_of_sensors(without) < max(_STAND_IN * chi2_of_sensors(fit), _NOTICED):
+                others[-1] = replace(others[-1], error=_error_of(library, others[-1].chosen, without))
+                return _without_superfluous(library, others, without)
+    return named, fit
 
 
 def _gains(
