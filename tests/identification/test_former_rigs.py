@@ -64,7 +64,7 @@ def test_a_rig_that_failed_once_is_identified_and_refined(name: str) -> None:
     json.dumps(refined.as_json(), allow_nan=False)
 
 
-@pytest.mark.by_day(6)
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("core", CORES)
 @pytest.mark.parametrize("name", CURED)
 def test_and_by_the_cores_with_the_bits_of_their_twins(name: str, core: Core) -> None:
