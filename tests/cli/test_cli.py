@@ -69,7 +69,7 @@ def test_the_paper_s_law_can_be_chosen(place: Path) -> None:
 
 
 def test_demo_prints_its_lines_and_draws_the_picture_of_the_readme(tmp_path: Path) -> None:
-    done = pvid(tmp_path, "demo")
+    done = pvid(tmp_path, "demo", PVID_CALLED="./tools/pvid")
     assert done.returncode == 0, done.stdout + done.stderr
     lines = [line.rstrip() for line in done.stdout.rstrip().splitlines()]
     readme = (ROOT / "README.md").read_text(encoding="utf-8")

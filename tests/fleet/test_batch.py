@@ -85,7 +85,7 @@ def test_a_name_that_is_no_utf_8_is_written_escaped(tmp_path: Path) -> None:
 
 def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "fleet.parquet"
-    (runs / "a" / "remarks.md").write_text("of nobody")
+    (runs / "a" / "photo.png").write_text("of nobody")
     done = pvid(tmp_path, "batch", str(runs), "-o", str(out), "--set", "l1=0.3", "--workers", "2")
     assert done.returncode == 0, done.stderr
     assert ": 2 of 3" in done.stdout and "failed: 1 of 3" in done.stdout
