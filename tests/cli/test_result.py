@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from own_mechanisms import OWN, own_recording
 from test_api import run as run  # the pendulum's
 
 import pvid
+from pvid.api.words import in_python
 from pvid.base.errors import PvidError
 from pvid.models.mechanisms import compiled_of
 
@@ -143,6 +145,32 @@ def test_other_recordings_have_the_columns_of_the_identification(tmp_path: Path)
     assert again.validate(other).sensors == found.sensors and len(again.predict(other)["T"])
     with pytest.raises(PvidError, match=r"no column 'time, ms' for t .* use columns="):
         result.validate(own)
+
+
+def test_the_columns_that_a_refusal_proposes_are_python() -> None:
+    own = data()
+    renamed = {"time, ms": 1e3 * own["t"], "P": own["P"], "T": own["T"]}
+    with pytest.raises(PvidError, match="use columns=") as told:
+        pvid.identify(renamed, model=PLATE)
+    columns = ast.literal_eval(str(told.value).rpartition("use columns=")[2].rstrip("."))
+    assert pvid.identify(renamed, model=PLATE, columns=columns).identified
+
+
+@pytest.mark.parametrize(
+    ("typed", "python"),
+    [
+        ("m: --own m gives each its own", "m: own=['m'] gives each its own"),
+        ("offsets; --shared x0,y0: one value in all", "offsets; shared=['x0', 'y0']: one value in all"),
+        ("does a parameter differ there (--own)?", "does a parameter differ there (own=...)?"),
+        ("weights alone (--weights sensors).", "weights alone."),
+        (
+            "--set sensor.a.noise=1 --set known.l1=0.3 --set sensor.b.noise=2, or",
+            'l1=0.3, settings={"sensor.a.noise": 1, "sensor.b.noise": 2}, or',
+        ),
+    ],
+)
+def test_options_are_arguments(typed: str, python: str) -> None:
+    assert in_python(typed) == python
 
 
 def test_a_frame_needs_pandas(found: pvid.Result, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,6 +35,7 @@ MJCF = """
     </body>
   </body>
 </body></worldbody>{more}</mujoco>"""
+HELD = MJCF.replace('type="slide"', 'type="slide" ref="0.2"')
 URDF = (Path(__file__).parents[1] / "data/robot/arm.urdf").read_text(encoding="utf-8")
 LOWER = next(one for one in re.findall(r"(?s)<inertial>.*?</inertial>", URDF) if 'mass value="1"' in one)
 FREE = '<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
@@ -57,17 +58,23 @@ def chain_of(folder: Path, text: str, *joints: str) -> Chain:
     return chain
 
 
-@pytest.mark.parametrize("text", [MJCF.format(more=""), URDF], ids=["MJCF", "URDF"])
-def test_a_model_file_has_the_torques_of_mujoco(text: str, tmp_path: Path) -> None:
-    chain = chain_of(tmp_path, text)
+@pytest.mark.parametrize(
+    ("text", "joints"),
+    [(MJCF.format(more=""), ()), (URDF, ()), (HELD.format(more=""), ("turn", "tilt", "other"))],
+    ids=["MJCF", "URDF", "held at zero, with a ref"],
+)
+def test_a_model_file_has_the_torques_of_mujoco(text: str, joints: tuple[str, ...], tmp_path: Path) -> None:
+    chain = chain_of(tmp_path, text, *joints)
     plain = re.sub("<visual>.*?</visual>", "", text)
     model = mujoco.MjModel.from_xml_string(plain)
     data, states = mujoco.MjData(model), np.random.default_rng(2).uniform(-1, 1, (3, model.nv, 10))
-    found = robot_arms.torques(chain, *states)
+    moved = [k for k in range(model.nv) if not joints or model.joint(k).name in joints]
+    states[:, [k for k in range(model.nv) if k not in moved]] = 0.0
+    found = robot_arms.torques(chain, *states[:, moved])
     for k, (q, v, a) in enumerate(states.transpose(2, 0, 1)):
         data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
         mujoco.mj_inverse(model, data)
-        np.testing.assert_allclose(found[:, k], data.qfrc_inverse, atol=1e-7)  # a file has ten digits
+        np.testing.assert_allclose(found[:, k], data.qfrc_inverse[moved], atol=1e-7)  # a file has ten digits
 
 
 def test_joints_that_are_not_chosen_are_held(tmp_path: Path) -> None:
@@ -147,6 +154,14 @@ def test_from_a_file_to_an_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert re.search(r"Fc2 \[N\*m\] +│ +(1.0\d*|0.99\d*) ", answer), answer
 
 
+def test_a_model_file_is_not_written_by_another_name(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(URDF)
+    arguments = ["model", "from", str(tmp_path / "arm.urdf"), "-o", str(tmp_path / "arm")]
+    found = CliRunner().invoke(commands, arguments, standalone_mode=False)
+    assert "arm: the name of a model file ends with .py" in str(found.exception)
+    assert not (tmp_path / "arm").exists()
+
+
 def test_a_coarse_encoder_is_doubted(tmp_path: Path) -> None:
     chain = chain_of(tmp_path, URDF)
     warnings = []
@@ -175,6 +190,7 @@ OTHERS = {
     "core": "identify log.csv --model robot.py --core f32",
     "refine": "identify log.csv --model robot.py --refine",
     "report": "identify log.csv --model robot.py --report report.html",
+    "write-model": "identify log.csv --model robot.py --write-model more.py",
     "add": "identify log.csv --model robot.py --add k*q1",
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -106,6 +107,28 @@ def test_a_recording_that_shows_nothing_is_refused(name: str) -> None:
     change(log)
     with pytest.raises(PvidError, match=re.escape(sentence)):
         identify_robot(model_of(SPATIAL), log, RATE)
+
+
+def test_a_log_that_needs_more_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And a log that is cut as the sentence proposes fits: the peak is what was allowed, and no small part of it."""
+    monkeypatch.setattr("pvid.oracle.weak.robot._MOST_BYTES", 1e7)
+    log = robot_arms.log_of(SPATIAL, 0, seconds=60.0)
+    with pytest.raises(PvidError, match="60 s of 3 joints need more than 0.01 GB of memory: cut the log to ") as told:
+        identify_robot(model_of(SPATIAL), log, RATE)
+    size = int(int(str(told.value).split()[-2]) * RATE)
+    fits(1)  # imports are no part of it
+    tracemalloc.start()
+    identify_robot(model_of(SPATIAL), {name: one[:size] for name, one in log.items()}, RATE)
+    assert 0.7 < tracemalloc.get_traced_memory()[1] / 1e7 < 1.3  # 1.1 with the samples
+    tracemalloc.stop()
+
+
+def test_a_log_without_a_window_predicts_nothing() -> None:
+    log, other = robot_arms.log_of(SPATIAL, 0), robot_arms.log_of(SPATIAL, 77)
+    answer = answer_of_robot(Recording(log.pop("t"), log, RATE), model_of(SPATIAL))
+    other["q2"][130::131] = np.nan
+    with pytest.raises(PvidError, match=r"a prediction needs a stretch of \S+ s without a gap: record longer"):
+        answer.predicts(Recording(other.pop("t"), other, RATE))
 
 
 def test_a_slow_clock_is_refused() -> None:

@@ -11,14 +11,17 @@ from pvid.base.errors import PvidError
 _TYPED = r"'[^']*'|\S*[^\s.,;:)]"
 _COLUMNS = re.compile(rf"--columns (?P<text>(?=\S*=)(?:{_TYPED}))")
 _SETTINGS = re.compile(rf"--set (?P<first>{_TYPED})(?: --set (?:{_TYPED}))*")
+_NAMES = re.compile(r"--(?P<name>own|shared) (?P<text>\w+(?:,\w+)*)")
 _FILE = re.compile(r"--(?P<name>model|rig) (?P<text>\S+\.\w+)")
-_ALONE = re.compile(r"--(?P<name>columns|model|rig)\b(?P<colon>:?)")
+_NOT_THERE = " (--weights sensors)"  # the words before it state the same
+_ALONE = re.compile(r"--(?P<name>columns|model|rig|own|shared)\b(?P<colon>:?)")
 
 
 def in_python(sentence: str) -> str:
     """A sentence with the arguments of `pvid.identify` in place of options: --set l1=0.3 is l1=0.3."""
-    sentence = _COLUMNS.sub(lambda one: f'columns="{_bare(one["text"])}"', sentence)
-    sentence = _SETTINGS.sub(lambda one: ", ".join(map(_setting, one[0].split("--set ")[1:])), sentence)
+    sentence = _COLUMNS.sub(lambda one: f"columns={_literal(_bare(one['text']))}", sentence)
+    sentence = _SETTINGS.sub(lambda one: _settings(one[0].split("--set ")[1:]), sentence)
+    sentence = _NAMES.sub(lambda one: f"{one['name']}={one['text'].split(',')}", sentence.replace(_NOT_THERE, ""))
     sentence = _FILE.sub(r'\g<name>="\g<text>"', sentence)
     return _ALONE.sub(lambda one: f"{one['name']}{':' if one['colon'] else '=...'}", sentence)
 
@@ -61,11 +64,16 @@ def _quoted(column: str) -> str:
 
 
 def _bare(text: str) -> str:
-    return text.strip("'").replace('"', "'")
+    return text.strip("'")
 
 
-def _setting(text: str) -> str:
-    """`known.l1=0.3` as an argument: the constants of a mechanism have no table."""
-    key, _, value = _bare(text.strip()).partition("=")
-    key = key.removeprefix("known.")
-    return f"{key}={value}" if key.isidentifier() else f'settings={{"{key}": {value}}}'
+def _literal(text: str) -> str:
+    return f"'{text}'" if '"' in text else f'"{text}"'
+
+
+def _settings(texts: list[str]) -> str:
+    """`known.l1=0.3` and others as arguments: the constants of a mechanism have no table."""
+    given = [_bare(one.strip()).removeprefix("known.").partition("=") for one in texts]
+    keys = [f"{key}={value}" for key, _, value in given if key.isidentifier()]
+    others = [f"{_literal(key)}: {value}" for key, _, value in given if not key.isidentifier()]
+    return ", ".join([*keys, *([f"settings={{{', '.join(others)}}}"] if others else [])])

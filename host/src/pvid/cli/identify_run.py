@@ -100,6 +100,7 @@ def identify_run(
     if rig.compiled().chain is not None:
         asked: dict[str, Any] = {"--on": on, "--refine": refine, "--add": add, "--own": own, "--shared": shared}
         asked |= {"--weights": weights != "residuals", "--figure": pictures.figure, "--report": pictures.report}
+        asked["--write-model"] = write_model
         asked |= {f"--{option} {value}": value for option, value in only_in_c.items()}
         return _identified_robot(paths, rig, columns, other, asked, as_json=as_json)
     if len(paths) > 1:

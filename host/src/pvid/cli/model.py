@@ -62,6 +62,8 @@ def from_file(path: Path, out: Path, joints: tuple[str, ...]) -> int:
     from pvid.models.mechanisms import compiled_of
     from pvid.models.robot_file import model_text
 
+    if out.suffix != ".py":
+        raise PvidError(f"{out}: the name of a model file ends with .py")
     write_whole(out, model_text(path, listed_names(joints)))
     compiled = compiled_of(out)
     click.echo(f"{out}: {len(compiled.signals) // 2} joints, {len(compiled.unknowns)} base parameters")

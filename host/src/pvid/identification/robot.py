@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.identification.answer import Answer, Factors, Float, Value
 from pvid.identification.sensor_prediction import SensorPrediction
@@ -160,6 +161,9 @@ def torques_of(
     left, moved, size = np.zeros(len(run.chain.joints)), np.zeros(len(run.chain.joints)), 0
     pieces = list(fit.predicted(run, np.asarray(p)))
     steps = sum(one.shape[1] for one, _ in pieces)
+    if not steps:
+        wanted = fit.fewest_samples(run) / run.sample_rate
+        raise PvidError(f"a prediction needs a stretch of {wanted:.3g} s without a gap: record longer")
     for measured, predicted in pieces:
         place = (np.arange(measured.shape[1]) + size) * len(p) // steps
         own = predicted[:, place, np.arange(len(place))]

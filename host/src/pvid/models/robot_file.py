@@ -41,7 +41,7 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
     mujoco, model = _read(path)
     joints = _chosen(mujoco, model, path, chosen)
     data = mujoco.MjData(model)
-    data.qpos[[model.jnt_qposadr[one] for one in joints]] = 0.0
+    data.qpos[model.jnt_qposadr] = 0.0
     mujoco.mj_kinematics(model, data)
     carrier = _carriers(model, joints)
     _refuse_loops(mujoco, model, carrier, path)

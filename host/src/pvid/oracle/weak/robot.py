@@ -44,6 +44,7 @@ _FEWEST_WINDOWS = 8
 _SLOW = 0.05  # of the root mean square of a rate: below it the sign of friction is in doubt
 _ORDERS, _REVERSALS = 3, 4  # directions of a reversal; most of them in a window that counts
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
+_MOST_BYTES = 4e9  # of the rows, with what is computed from them
 _DIRECTION = 1e-6  # relative size of a direction that is one
 
 
@@ -228,6 +229,14 @@ class RobotRows:
         """Of a run; see RobotRun.values."""
         functions = run.design.functions
         hop, n = functions.hop, len(run.chain.joints)
+        # At the peak 4 copies of the regressors and 7 of the doubts: measured on 3, 6 and 7 joints, to 13 %.
+        window = 8 * n * functions.count * (4 * len(columns) + 7 * functions.count)
+        samples, most = sum(one.shape[1] for one in run.positions), int(_MOST_BYTES / window) * hop
+        if samples > most:
+            raise PvidError(
+                f"{samples / run.sample_rate:.0f} s of {n} joints need more than {_MOST_BYTES / 1e9:.3g} GB of memory: "
+                f"cut the log to {int(most / run.sample_rate)} s"
+            )
         tables = [functions.combine(0), -functions.combine(1)]
         parts, known, doubts, follows = [], [], [], []
         for segment in run.values(columns, max(_STEPS // hop, 1) * hop, seed, sign):
@@ -309,12 +318,18 @@ class RobotFit:
         """Of the windows."""
         return self.run.design
 
+    def fewest_samples(self, run: RobotRun) -> int:
+        """Of a segment of a run whose torques are predicted."""
+        return max(2 * run.design.functions.hop, 2 * self.design.taps + 1) + run.design.taps - 1
+
     def predicted(self, run: RobotRun, p: Float) -> Iterator[tuple[Float, Float]]:
         """Torques of each segment of a run, measured and as each of several p [.., p] gives them: [n, steps] and
         [n, .., steps]."""
         n, taps = len(run.chain.joints), 2 * self.design.taps + 1
         weights = polynomial_weights(taps, _DEGREE, 1) * run.sample_rate
         for segment in run.values(self.columns, _STEPS):
+            if segment.position.shape[1] < taps:
+                continue
             whole = np.zeros((2, n, len(p), segment.position.shape[1]))
             first = 0
             for values in segment.pieces():
