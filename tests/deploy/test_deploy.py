@@ -92,6 +92,61 @@ def test_cmake(name: str, deployments: dict[str, Deployment], tmp_path: Path) ->
     assert run(tree / f"{one.name}_example").splitlines() == expected(one)
 
 
+LIVES = """\
+#include <stdio.h>
+#include <string.h>
+#include "../src/NAME_identifier.c"
+
+static uint8_t image[65536], loaded[UPPER_RECORD], whole[UPPER_RECORD], record[UPPER_RECORD];
+
+static void publish(void)
+{
+    identifier.trust.estimate.standing.state = PVID_STANDING_VALID;
+    identifier.trust.mark.number[0] = 1u;
+}
+
+static void save(uint8_t to[])
+{
+    while (NAME_save(to) == PVID_RECORD_MORE) {
+    }
+}
+
+int main(void)
+{
+    printf("%d", (int)NAME_begin());
+    const size_t length = NAME_snapshot_save(1, image, sizeof image);
+    publish();
+    save(loaded);
+    for (int life = 0; life < 3; life++) {
+        publish();
+        printf(" %d", (int)NAME_save(record));
+        printf(" %d", (life == 0)   ? (NAME_begin() == PVID_OK)
+                      : (life == 1) ? (NAME_load(loaded) == PVID_RECORD_DONE)
+                                    : NAME_snapshot_restore(image, length));
+        publish();
+        identifier.trust.estimate.p[0] /= life + 2;
+        save(record);
+        save(whole);
+        printf(" %d", (memcmp(whole, record, sizeof whole) == 0) && (memcmp(whole, loaded, 20) != 0));
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("name", ["dc_motor", "dc_motor in integers", "kapitza"])
+def test_a_record_is_of_one_life(
+    name: str, deployments: dict[str, Deployment], pendulum: Deployment, tmp_path: Path
+) -> None:
+    """A piece is saved, then another life publishes an estimate of the same number."""
+    one = pendulum if name == "kapitza" else deployments[name]
+    folder = written(one, "cmake", tmp_path / "p")
+    text = LIVES.replace("NAME", one.name).replace("UPPER", one.upper)
+    (folder / "example" / "main.c").write_text(text, encoding="utf-8")
+    tree = built(folder, tmp_path / "b")
+    assert run(tree / f"{one.name}_example").split() == ["0", *("1 1 1".split() * 3)]
+
+
 def test_the_example_of_a_refined_mechanism_prints_the_refined_estimate(pendulum: Deployment, tmp_path: Path) -> None:
     """It is right where the weak form, whose equations are linear in the angle, is several standard errors off."""
     tree = built(written(pendulum, "cmake", tmp_path / "p"), tmp_path / "b", "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror")

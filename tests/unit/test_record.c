@@ -239,6 +239,10 @@ static void whole_records_of_others_name_their_reason(void **state)
     other.design = &another;
     assert_int_equal(pvid_record_load_weak_f32(&next, &other, MECHANISM, record, LENGTH), PVID_RECORD_NOT_READY);
     assert_memory_equal(&next, &before, sizeof next);
+    static const pvid_weak_f32 cleared;
+    config.trust.se_max = -1.0f; /* init refuses it */
+    assert_int_equal(load(record, LENGTH), PVID_RECORD_NOT_READY);
+    assert_memory_equal(&next, &cleared, sizeof next);
 }
 
 /* ---- fixed point ---- */
@@ -272,7 +276,8 @@ static void integers_of_any_format_are_written_as_the_nearest_binary32(void **st
         save_fixed();
         for (size_t a = 0, at = 12; a < 4u; at += 8u + (2u * (3u - a)), a++) {
             const double exact = ldexp((double)fixed.trust.estimate.p[a], -fixed.estimator.settings.p_bits[a]);
-            const double error = ldexp((double)fixed.trust.estimate.se[a], -fixed.estimator.settings.p_bits[a]);
+            const int32_t se = fixed.trust.estimate.se[a];
+            const double error = ldexp((se > 0) ? (double)se : 1.0, -fixed.estimator.settings.p_bits[a]);
             assert_true(fabs((double)pvid_get_f32(&record[at]) - exact) <= fabs(exact) * ldexp(1.0, -24));
             assert_true(fabs((double)pvid_get_f32(&record[at + 4u]) - error) <= error * ldexp(1.0, -24));
         }
@@ -290,7 +295,7 @@ static void a_record_is_the_start_in_fixed_point(void **state)
         for (size_t a = 0; a < 4u; a++) {
             const int64_t room = (int64_t)given->estimator.upper[a] - given->estimator.lower[a];
             fixed.trust.estimate.p[a] = (int32_t)(given->estimator.lower[a] + ((room * round) / 200));
-            fixed.trust.estimate.se[a] = (round % 3 == 0) ? 1 : (given->estimator.start_sd[a] / (2 * round));
+            fixed.trust.estimate.se[a] = (round % 3 == 0) ? (round % 2) : (given->estimator.start_sd[a] / (2 * round));
             for (size_t b = 0; b < a; b++) {
                 fixed.trust.estimate.correlation[a][b] = (round - 100) * (int32_t)((a + b) << 20);
                 fixed.trust.estimate.correlation[b][a] = fixed.trust.estimate.correlation[a][b];
@@ -301,7 +306,7 @@ static void a_record_is_the_start_in_fixed_point(void **state)
         for (size_t a = 0; a < 4u; a++) {
             const double p = (double)fixed.trust.estimate.p[a];
             assert_true(fabs((double)next_fixed.estimator.p[a] - p) <= 0.5 + (fabs(p) * ldexp(1.0, -24)));
-            const double se = (double)fixed.trust.estimate.se[a];
+            const double se = fmax((double)fixed.trust.estimate.se[a], 1.0); /* 0: less than a count */
             assert_true(fabs((double)next_fixed.trust.copy.se[a] - se) <= 0.5 + (se * ldexp(1.0, -24)));
             for (size_t b = 0; b < 4u; b++) {
                 const int32_t error = next_fixed.trust.copy.correlation[a][b] - fixed.trust.estimate.correlation[a][b];

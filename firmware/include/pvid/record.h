@@ -15,7 +15,7 @@
  *   status = pvid_record_load_weak_f32(&identifier, &config, mechanism, flash, sizeof record);
  *
  * Save writes what was published and is valid now (standing.h), else nothing. Load changes nothing unless it returns
- * PVID_RECORD_DONE. The checksum detects accidents, not attacks.
+ * PVID_RECORD_DONE or init refuses its config. The checksum detects accidents, not attacks.
  *
  * Layout, all numbers little-endian:
  *    0 magic "PVRC"   4 format, 1   5 n_p   6 length [bytes], 16 bits   8 mechanism
@@ -50,7 +50,8 @@ typedef enum {
 /* Length of a record [bytes]. */
 #define PVID_RECORD_BYTES(n_p) (16u + (8u * (n_p)) + ((n_p) * ((n_p) - 1u)))
 
-/* How far a record is written; all zeros before the first call. */
+/* How far a record is written. All zeros before the first call and after each init, load or restore; the same bytes
+ * until PVID_RECORD_DONE. */
 typedef struct {
     uint32_t number; /* of the estimate */
     uint32_t crc;    /* of the bytes so far */

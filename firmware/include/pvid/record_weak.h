@@ -20,7 +20,9 @@ pvid_record_status pvid_record_save_weak_f32(const pvid_weak_f32 *self, pvid_rec
 /* Initialises `self` again with config and the record's values as the start; start_sd stays config's: a smaller one
  * delays the first estimate, and would hold p where the mechanism has changed. Until that estimate, the published one
  * is the record's, with its standard errors, number 0 and no standing. Bytes behind the record are ignored. Any answer
- * but PVID_RECORD_DONE leaves `self` unchanged. Call it from the context of step. Cost: that of init. */
+ * but PVID_RECORD_DONE leaves `self` unchanged, but for PVID_RECORD_NOT_READY by a config that init refuses: `self`
+ * must be initialised again. Call it from the context of step; no other context reads meanwhile, as during init. Cost:
+ * that of init. */
 pvid_record_status pvid_record_load_weak_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,
                                              uint32_t mechanism, const uint8_t record[], size_t length);
 

@@ -216,7 +216,12 @@ void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen);
  * and the sums of a window contain no constant. channel: that of the model which is the sample itself
  * (`pvid model build` prints it). Call it between two steps. Returns false and changes nothing iff
  *   - `self` is not initialised, has a second stage, or shift is not finite, or
- *   - the sample is more than one signal, or the channel occurs without a derivative.
+ *   - the model has no such sample or channel, or a signal of the sample is not PVID_SIGNAL_SAMPLED, or
+ *   - the channel has an integral or no gain, or occurs without a derivative.
+ *
+ * Not checked: `channel` must be the sample itself, and where the sample also occurs inside a gain, an integrand or a
+ * sign, `shift` must leave that unchanged (2 pi in a sine).
+ *
  * Cost: 30 operations a harmonic. Source: src/weak/rebase_f32.c. */
 bool pvid_weak_rebase_f32(pvid_weak_f32 *self, uint8_t sample, uint8_t channel, float shift);
 

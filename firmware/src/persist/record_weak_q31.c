@@ -61,7 +61,7 @@ pvid_record_status pvid_record_save_weak_q31(const pvid_weak_q31 *self, pvid_rec
     const size_t a = writer->next;
     pvid_record_row row;
     row.value = word_of(estimate.p[a], self->estimator.settings.p_bits[a]);
-    row.error = word_of(estimate.se[a], self->estimator.settings.p_bits[a]);
+    row.error = word_of((estimate.se[a] > 0) ? estimate.se[a] : 1, self->estimator.settings.p_bits[a]);
     for (size_t b = a + 1u; b < n_p; b++) {
         row.correlation[b] =
             (int16_t)pvid_clamp_q31(pvid_scale_q31(estimate.correlation[a][b], 15), (int64_t)ONE_Q15 - 1);

@@ -9,6 +9,9 @@ from pvid.codegen.c_text import for_cpp
 from pvid.deploy.deployment import Deployment, Files, Quantity, SecondStage
 from pvid.design.c_tables import float_literal
 
+# A record is of one life.
+_NO_PIECE = "    writer = (pvid_record_writer){0u, 0u, 0u};"
+
 
 def identifier_files(deployment: Deployment) -> Files:
     """Name -> text."""
@@ -144,6 +147,7 @@ def _source(d: Deployment) -> str:
         f"#define MECHANISM 0x{d.mechanism:08X}u",
         "",
         f"static pvid_weak_{core} identifier;",
+        "static pvid_record_writer writer;",
         *scale,
         "",
         _names(d, "parameter", [one.name for one in d.parameters]),
@@ -202,12 +206,12 @@ def _source(d: Deployment) -> str:
         "",
         f"pvid_record_status {d.name}_save(uint8_t record[{upper}_RECORD])",
         "{",
-        "    static pvid_record_writer writer;",
         f"    return pvid_record_save_weak_{core}(&identifier, &writer, MECHANISM, record, {upper}_RECORD);",
         "}",
         "",
         f"pvid_record_status {d.name}_load(const uint8_t record[{upper}_RECORD])",
         "{",
+        _NO_PIECE,
         f"    return pvid_record_load_weak_{core}(&identifier, &{d.name}_config_{core}, MECHANISM, record,",
         f"                                     {upper}_RECORD);",
         "}",
@@ -219,6 +223,7 @@ def _source(d: Deployment) -> str:
         "",
         f"bool {d.name}_snapshot_restore(const uint8_t image[], size_t length)",
         "{",
+        _NO_PIECE,
         f"    return pvid_snapshot_restore_weak_{core}(&identifier, &{d.name}_config_{core}, image, length) ==",
         "           PVID_SNAPSHOT_RESTORED;",
         "}",
@@ -234,7 +239,8 @@ def _turning_declarations(d: Deployment) -> list[str]:
         for line in (
             f"/* sample[{one.place}] from the raw counter of its encoder [{one.lsb:.6g} a count], which starts over at",
             " * modulus: 65536, 4000, or 0 for 2^32. The angle may turn without end: it is given to step about a",
-            " * reference that follows it. Call it once a tick, before step; not with a second stage. */",
+            " * reference that follows it. Call it once a tick, before step; with a second stage the angle grows:",
+            " * windows are held out of range. */",
             f"float {d.name}_counted_{one.name}(uint32_t counter, uint32_t modulus);",
             "",
         )
@@ -252,9 +258,9 @@ def _turning(d: Deployment) -> list[str]:
             "    static uint32_t before;",
             "    static uint32_t place; /* counts, modulo 2^32 */",
             "    static uint32_t reference;",
-            "    place += (uint32_t)pvid_counter_way(before, counter, modulus);",
+            "    place += (uint32_t)pvid_counter_difference(before, counter, modulus);",
             "    before = counter;",
-            "    const int32_t count = pvid_counter_way(reference, place, 0u);",
+            "    const int32_t count = pvid_counter_difference(reference, place, 0u);",
             f"    const float angle = {float_literal(np.float32(one.lsb))} * (float)count;",
             f"    if (((count <= {one.limit}) && (count >= -{one.limit})) ||",
             f"        !pvid_weak_rebase_f32(&identifier, {one.place}u, {one.channel}u, angle)) {{",
@@ -273,12 +279,14 @@ def _begin(d: Deployment) -> list[str]:
         return [
             f"pvid_status {d.name}_begin(void)",
             "{",
+            _NO_PIECE,
             f"    return pvid_weak_init_{d.core}(&identifier, &{d.name}_config_{d.core});",
             "}",
         ]
     return [
         f"pvid_status {d.name}_begin_with(const pvid_weak_refine_f32 *stage)",
         "{",
+        _NO_PIECE,
         f"    pvid_weak_config_f32 config = {d.name}_config_f32;",
         "    config.refine = stage;",
         "    return pvid_weak_init_f32(&identifier, &config);",

@@ -73,6 +73,7 @@ def _refined(d: Deployment) -> list[str]:
         f"`{d.name}_begin_refined()` in place of `{d.name}_begin()` switches the second stage on, as the example does:",
         "it fits the full equations, from the first stage's estimate on, to the statistical limit, and",
         f"`{d.name}_read_refined(value, error)` reads its estimate. Without it neither flash nor RAM is taken.",
+        *(f"With it the angle of `{d.name}_counted_{x.name}` grows: windows are held out of range." for x in d.turning),
     ]
 
 
