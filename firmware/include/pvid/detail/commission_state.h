@@ -19,6 +19,7 @@ struct pvid_commission_f32 {
     bool has_begun; /* the pass */
     uint8_t pass;
     float start[PVID_MAX_P];
+    float own[PVID_MAX_P]; /* standard errors of the result without those that all windows share */
 };
 
 #endif

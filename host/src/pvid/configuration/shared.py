@@ -19,8 +19,10 @@ from pvid.oracle.weak.shared import Cause, of_scale, of_signals, or_nan
 from pvid.oracle.weak.solve import Fit
 
 Run = Mapping[str, npt.ArrayLike]
+Bools = npt.NDArray[np.bool_]
 
 _MOST = 100.0  # of a parameter, also where a number ran away: nothing is known of it
+_LARGEST = 1e9  # of trust.h
 _CLASH = 3.0  # standard errors between two forms of one run, as of pvid.identification.core
 _NAMED, _LEAST = 3, 0.1  # causes of an error, and how much of it each is at least
 _RELATIVE_BITS, _CORRELATION_BITS = 24, 30  # of trust_q31.h
@@ -39,30 +41,30 @@ class Shared:
     """
 
     p: Float
-    positive: npt.NDArray[np.bool_]
+    positive: Bools
     sd: Float
     correlation: Float
     causes: tuple[Cause, ...]
 
     @classmethod
-    def of(cls, fit: Fit, causes: Sequence[Cause], more: Float | float = 0.0) -> Shared:
-        """At the p of a fit; more: standard deviations besides, which no two parameters share [n_p]."""
-        positive = fit.rows.compiled.parameters.positive
-        scale = np.where(positive, np.maximum(np.abs(fit.p), 1e-300), 1.0)
-        most = np.where(positive, _MOST, _MOST * np.maximum(np.abs(fit.p), 1.0))
+    def of(cls, p: Float, positive: Bools, causes: Sequence[Cause], more: Float | float = 0.0) -> Shared:
+        """more: standard deviations besides, which no two parameters share [n_p]."""
+        scale = np.where(positive, np.maximum(np.abs(p), 1e-300), 1.0)
+        most = np.where(positive, _MOST, _MOST * np.maximum(np.abs(p), 1.0))
         moves = np.array([np.clip(np.nan_to_num(one.moves / scale, nan=np.inf), -most, most) for one in causes])
         own = np.clip(np.nan_to_num(more / scale, nan=np.inf), 0.0, most)
         covariance = moves.T @ moves + np.diag(np.broadcast_to(own, scale.shape) ** 2)
         sd = np.sqrt(np.diag(covariance))
         inverse = 1 / np.where(sd > 0, sd, np.inf)
         correlation = np.clip(covariance * np.outer(inverse, inverse), -1.0, 1.0)
-        return cls(fit.p, positive, sd, correlation, tuple(one for one in causes if np.any(one.moves)))
+        return cls(p, positive, sd, correlation, tuple(one for one in causes if np.any(one.moves)))
 
     @classmethod
     def of_design(cls, run: Run, design: WeakDesign, fit: Fit) -> Shared:
         """Of a run that the design is for, and that no sensor of the rig has shown."""
         library = Library(run, design, fit)
-        return cls.of(fit, [*of_scale(library), *of_signals(library), *_of_signs(run, design, fit)])
+        causes = [*of_scale(library), *of_signals(library), *_of_signs(run, design, fit)]
+        return cls.of(fit.p, fit.rows.compiled.parameters.positive, causes)
 
     @classmethod
     def of_answer(cls, run: Run, found: Identified, fit: Fit) -> Shared:
@@ -78,12 +80,14 @@ class Shared:
         model = np.abs(found.shifts)
         if len(model):
             largest = found.shifts[int(np.argmax(np.sum(np.square(model / np.maximum(found.se, 1e-300)), axis=1)))]
-            causes.append(Cause("the model", 1.0, "", largest))
+            causes.append(Cause("the model", largest))
         apart = fit.p - found.p
         rows = np.maximum(found.predicted, found.clustered)
         rest = found.noise**2 - rows**2 + found.by_model**2 - (causes[-1].moves ** 2 if len(model) else 0.0)
-        causes.append(Cause("the core's form", 1.0, "", np.where(np.abs(apart) > _CLASH * found.noise, apart, 0.0)))
-        return cls.of(found.fit, causes, np.sqrt(np.maximum(rest, 0.0)))
+        causes.append(Cause("the core's form", np.where(np.abs(apart) > _CLASH * found.noise, apart, 0.0)))
+        # the board has these as positive, also where the analysis found one near 0 on a scale of its own
+        positive = fit.rows.compiled.parameters.positive
+        return cls.of(found.fit.p, positive, causes, np.sqrt(np.maximum(rest, 0.0)))
 
     @classmethod
     def of_part(cls, compiled: CompiledModel, part: float) -> Shared:
@@ -108,7 +112,7 @@ class Shared:
     @property
     def triangle(self) -> npt.NDArray[np.float32] | None:
         """`shared` of trust.h; None: there are none."""
-        table = self._table(self.sd, self.correlation)
+        table = self._table(np.minimum(self.sd, _LARGEST), self.correlation)
         return table.astype(np.float32) if table.any() else None
 
     def counts(self, p_bits: Sequence[int]) -> tuple[int, ...] | None:
@@ -127,4 +131,4 @@ def _of_signs(run: Run, design: WeakDesign, fit: Fit) -> Iterator[Cause]:
     """The core takes the mean of a noisy rate's sign over a step: how far p is from that with located reversals."""
     if fit.rows.compiled.channels.signs and design.reversals == "averaged":
         rows = WeakRows.of(fit.rows.compiled, run, replace(design, reversals="located"))
-        yield Cause("signs of a noisy rate", 1.0, "", fit.p - or_nan(fit, lambda: gated(rows, fit.p).p))
+        yield Cause("signs of a noisy rate", fit.p - or_nan(fit, lambda: gated(rows, fit.p).p))

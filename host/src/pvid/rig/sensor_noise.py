@@ -71,7 +71,7 @@ def white_noise(values: npt.ArrayLike, inputs: list[Float], least: float = 0.0) 
     fast, slower = _differences(x, 1, 6), _differences(x, 2, 3)
     if not _spread(fast) > least:  # NaN, too
         return None
-    quiet = np.ones(len(fast), bool)
+    quiet = np.arange(len(fast)) >= _LAGS  # behind the first, which have no earlier inputs
     columns = []
     for fast_input in (_differences(u[:_MOST_SAMPLES], 1, 6) for u in inputs):
         columns += [np.roll(fast_input, lag) for lag in range(_LAGS)]

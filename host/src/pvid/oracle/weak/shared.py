@@ -35,27 +35,24 @@ class Cause:
     Attributes
     ----------
     text : what it is
-    sd : its standard deviation [unit]
-    moves : what p is off by for one of them [n_p]
+    moves : what p is off by for one standard deviation of it [n_p]
     """
 
     text: str
-    sd: float
-    unit: str
     moves: Float
 
 
 def of_scale(library: Library) -> list[Cause]:
     """Constants, gains and the clock that have a standard deviation, in this order, and neglected terms."""
     fit, model, run = library.fit, library.model, library.run
-    out = [_cause(fit, one.name, one.sd, one.unit, partial(_by_known, library, one)) for one in model.knowns if one.sd]
+    out = [_cause(fit, one.name, one.sd, partial(_by_known, library, one)) for one in model.knowns if one.sd]
     for one in model.signals:
         if one.gain_sd:
-            out.append(_cause(fit, f"gain of {one.name}", one.gain_sd, "", partial(library.by_gain, one.name)))
+            out.append(_cause(fit, f"gain of {one.name}", one.gain_sd, partial(library.by_gain, one.name)))
     if model.clock_sd:
-        out.append(_cause(fit, "sample rate", model.clock_sd, "", library.by_clock))
+        out.append(_cause(fit, "sample rate", model.clock_sd, library.by_clock))
     part = neglected(model, run)
-    return [*out, Cause("neglected terms", part, "", ready(model).parameters.positive * fit.p * part)]
+    return [*out, Cause("neglected terms", ready(model).parameters.positive * fit.p * part)]
 
 
 def of_signals(library: Library) -> Iterator[Cause]:
@@ -64,13 +61,10 @@ def of_signals(library: Library) -> Iterator[Cause]:
         recorded = library.recorded(one.name)
         if not recorded.top:
             continue
-        for text, sd, unit, act in (
-            ("delay", delay_sd(one, recorded.rate), "s", DELAY),
-            ("offset", offset_sd(one), one.unit, OFFSET),
-        ):
+        for text, sd, act in (("delay", delay_sd(one, recorded.rate), DELAY), ("offset", offset_sd(one), OFFSET)):
             if sd:
                 term = library.act(recorded, act, 0.0)  # what puts it right
-                yield _cause(library.fit, f"{text} of {one.name}", -sd, unit, partial(library.scores.shift, term))
+                yield _cause(library.fit, f"{text} of {one.name}", -sd, partial(library.scores.shift, term))
 
 
 def delay_sd(signal: Signal, sample_rate: float) -> float:
@@ -100,8 +94,8 @@ def or_nan(fit: Fit, computation: Callable[[], Float]) -> Float:
     return np.full(len(fit.p), np.nan) if found is None else found
 
 
-def _cause(fit: Fit, text: str, sd: float, unit: str, slope: Callable[[], Float]) -> Cause:
-    return Cause(text, abs(sd), unit, sd * or_nan(fit, slope))
+def _cause(fit: Fit, text: str, sd: float, slope: Callable[[], Float]) -> Cause:
+    return Cause(text, sd * or_nan(fit, slope))
 
 
 def _by_known(library: Library, known: Known) -> Float:
