@@ -101,44 +101,30 @@ def identify_typed(
     """As `identify`; refusals name the options of the command line."""
     # Matrices are small: threads would wait for each other, on all cores.
     with threadpool_limits(limits=1, user_api="blas"):
-        return _identify(data, model, rig, columns, core, refine, settings, own, shared)
-
-
-def _identify(
-    data: Data | Sequence[Data],
-    model: str | os.PathLike[str] | Model | None,
-    rig: str | os.PathLike[str] | None,
-    columns: str | None,
-    core: Literal["f32", "q31", "f64"] | None,
-    refine: bool | None,
-    settings: Mapping[str, Any],
-    own: Sequence[str],
-    shared: Sequence[str],
-) -> Result:
-    several = list(data) if isinstance(data, list | tuple) else [data]
-    if not several:
-        raise PvidError("data: the list of recordings is empty")
-    paths = [Path(one) if isinstance(one, str | os.PathLike) else None for one in several]
-    texts = tuple(f"{key}={_toml(value)}" for key, value in settings.items())
-    rig_path, asked = None if rig is None else Path(rig), model
-    files = [one for one in paths if one is not None]
-    if files:
-        found = common_rig(files, rig_path, texts, asked, columns)
-    else:
-        found = rig_of(None, rig_path, texts, asked, columns, partial(recording_of_arrays, named(several[0]), None))
-    sources = [
-        partial(recording_of_arrays, named(one), found.sample_rate) if path is None else source_of(path)
-        for one, path in zip(several, paths, strict=True)
-    ]
-    recording, compiled = read_all(found, sources, _names(paths), columns)
-    in_c = CORES.get(core or "")
-    of_each = own_of(compiled, recording, own, shared, in_c=in_c is not None)
-    options = {"model": model, "rig": rig, "columns": columns, "core": core, "refine": refine, **settings}
-    made = Made.of(_call(paths, options), files, rig_path, found)
-    if compiled.chain is not None and not (in_c or refine or own or shared):
-        return result_of(answer_of_robot(recording, compiled), made, columns)
-    answer = identified(recording, compiled, refine=False if in_c else refine, own=of_each)
-    return result_of(answer if in_c is None else identify_in_c(answer, in_c.name), made, columns)
+        several = list(data) if isinstance(data, list | tuple) else [data]
+        if not several:
+            raise PvidError("data: the list of recordings is empty")
+        paths = [Path(one) if isinstance(one, str | os.PathLike) else None for one in several]
+        texts = tuple(f"{key}={_toml(value)}" for key, value in settings.items())
+        rig_path, asked = None if rig is None else Path(rig), model
+        files = [one for one in paths if one is not None]
+        if files:
+            found = common_rig(files, rig_path, texts, asked, columns)
+        else:
+            found = rig_of(None, rig_path, texts, asked, columns, partial(recording_of_arrays, named(several[0]), None))
+        sources = [
+            partial(recording_of_arrays, named(one), found.sample_rate) if path is None else source_of(path)
+            for one, path in zip(several, paths, strict=True)
+        ]
+        recording, compiled = read_all(found, sources, _names(paths), columns)
+        in_c = CORES.get(core or "")
+        of_each = own_of(compiled, recording, own, shared, in_c=in_c is not None)
+        options = {"model": model, "rig": rig, "columns": columns, "core": core, "refine": refine, **settings}
+        made = Made.of(_call(paths, options), files, rig_path, found)
+        if compiled.chain is not None and not (in_c or refine or own or shared):
+            return result_of(answer_of_robot(recording, compiled), made, columns)
+        answer = identified(recording, compiled, refine=False if in_c else refine, own=of_each)
+        return result_of(answer if in_c is None else identify_in_c(answer, in_c.name), made, columns)
 
 
 def _call(paths: Sequence[Path | None], options: Mapping[str, Any]) -> str:

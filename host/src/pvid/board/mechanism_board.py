@@ -185,11 +185,7 @@ class MechanismBoard(FloatBoard):
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         code = files_weak.printed(GeneratedModel(self.compiled, _COMMAND))
-        code["stream_tables.h"] = files_weak.design_header(
-            replace(self._shared, causes=()),
-            self.compiled,
-            _COMMAND,  # which the text of a log does not have
-        )
+        code["stream_tables.h"] = files_weak.design_header(self._shared, self.compiled, _COMMAND)
         if self.refine is not None:
             code |= files_refine.files_of(self.equations, _COMMAND)
             code["stream_refine.h"] = _refine_header(self.refine, self.shown)

@@ -150,13 +150,7 @@ class MechanismBoardQ31:
         code = {
             f"{name}_weak_q31.h": files_weak_q31.header(weak.made, sizes, _COMMAND),
             f"{name}_weak_q31.c": files_weak_q31.source(weak.made, weak.parameters, _COMMAND),
-            "stream_tables.h": files_weak_q31.design_header(
-                replace(self.config, causes=()),
-                name,
-                sizes,
-                _COMMAND,
-                [],  # which the text of a log does not have
-            ),
+            "stream_tables.h": files_weak_q31.design_header(self.config, name, sizes, _COMMAND, []),
         }
         return StreamImage.made(
             "weak",

@@ -46,7 +46,7 @@ def printed_design(model: GeneratedModel) -> dict[str, str]:
         return {}
     design = replace(options.design, design=options.design.design.with_soft_widths(options.soft_signs))
     return {
-        f"{name}_design_f32.h": design_header(design, compiled, model.command),
+        f"{name}_design_f32.h": design_header(design, compiled, model.command, design.causes),
         f"{name}_config.h": config_header(f"{name}_config", fitted_sizes(design), model.command),
     }
 
@@ -222,13 +222,14 @@ def _struct(model: WeakModel, name: str, upper: str) -> str:
 _WIDTH = 8  # numbers a line
 
 
-def design_header(config: WeakConfig, compiled: CompiledModel, command: str) -> str:
+def design_header(config: WeakConfig, compiled: CompiledModel, command: str, causes: Sequence[str] = ()) -> str:
     """NAME_design_f32.h.
 
     Parameters
     ----------
     config : settings and tables for the rig
     command : that makes it; no date, so that the same command makes the same file
+    causes : of the shared errors, for its banner; the text of a log does not have them
     """
     design = config.design
     name = design.model.name
@@ -255,7 +256,7 @@ def design_header(config: WeakConfig, compiled: CompiledModel, command: str) -> 
                 for one, start, low, high in zip(compiled.unknowns, own.start, own.lower, own.upper, strict=True)
             ]
         ),
-        *shared_errors(config.causes),
+        *shared_errors(causes),
     ]
     body = [
         "#include <stddef.h>",

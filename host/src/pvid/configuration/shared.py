@@ -23,7 +23,7 @@ Bools = npt.NDArray[np.bool_]
 
 _MOST = 100.0  # of a parameter, also where a number ran away: nothing is known of it
 _LARGEST = 1e9  # of trust.h
-_CLASH = 3.0  # standard errors between two forms of one run, as of pvid.identification.core
+CLASH = 3.0  # standard errors of noise by which the core and the analysis disagree
 _NAMED, _LEAST = 3, 0.1  # causes of an error, and how much of it each is at least
 _RELATIVE_BITS, _CORRELATION_BITS = 24, 30  # of trust_q31.h
 
@@ -67,7 +67,7 @@ class Shared:
         return cls.of(fit.p, fit.rows.compiled.parameters.positive, causes)
 
     @classmethod
-    def of_answer(cls, run: Run, found: Identified, fit: Fit) -> Shared:
+    def of_answer(cls, found: Identified, fit: Fit) -> Shared:
         """Of a recording: the parts of the answer's standard errors that a longer run does not reduce, which are those
         of scale and of the model, and by how much its noise is more than that of its rows.
 
@@ -75,8 +75,7 @@ class Shared:
         ----------
         fit : of the board's form to the recording; its distance belongs to the model's part where noise explains none
         """
-        own = of_scale(Library(run, found.design, found.fit))
-        causes = [replace(one, moves=moves) for one, moves in zip(own, found.gains, strict=True)]
+        causes = list(found.causes)
         model = np.abs(found.shifts)
         if len(model):
             largest = found.shifts[int(np.argmax(np.sum(np.square(model / np.maximum(found.se, 1e-300)), axis=1)))]
@@ -84,7 +83,7 @@ class Shared:
         apart = fit.p - found.p
         rows = np.maximum(found.predicted, found.clustered)
         rest = found.noise**2 - rows**2 + found.by_model**2 - (causes[-1].moves ** 2 if len(model) else 0.0)
-        causes.append(Cause("the core's form", np.where(np.abs(apart) > _CLASH * found.noise, apart, 0.0)))
+        causes.append(Cause("the core's form", np.where(np.abs(apart) > CLASH * found.noise, apart, 0.0)))
         # the board has these as positive, also where the analysis found one near 0 on a scale of its own
         positive = fit.rows.compiled.parameters.positive
         return cls.of(found.fit.p, positive, causes, np.sqrt(np.maximum(rest, 0.0)))

@@ -103,7 +103,7 @@ class WeakTables:
     def shared(self, run: Run, found: Identified | None = None) -> Shared:
         """Errors that all windows share; found: as of weak_config."""
         if found is not None:
-            return Shared.of_answer(run, found, self.fit)
+            return Shared.of_answer(found, self.fit)
         return Shared.of_design(run, self.rows.record.grid.design, self.fit)
 
 

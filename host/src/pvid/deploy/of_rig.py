@@ -73,7 +73,7 @@ def deployment_f32(
     playback = _playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns)))
     whole = GeneratedModel(compiled, command, Options(refine_design=refine))
     generated = files_weak.printed(whole)
-    generated[f"{name}_design_f32.h"] = files_weak.design_header(config, compiled, command)
+    generated[f"{name}_design_f32.h"] = files_weak.design_header(config, compiled, command, config.causes)
     second = None
     if refine is not None:
         functions = whole.refinement.needed

@@ -16,6 +16,7 @@ import numpy as np
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
 from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.configuration.shared import CLASH
 from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.configuration.weak_q31 import weak_q31_to_identify
 from pvid.core.native import Publisher
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 
 # Reasons of ticks that end no window.
 _WITHIN = (Outcome.WARMING_UP, Outcome.ACCUMULATED, Outcome.REJECTED_NOT_FINITE, Outcome.REJECTED_SATURATED)
-_CLASH = 3.0  # standard errors of noise by which the core and the analysis disagree
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class CoreAnswer(Answer):
             return False
         # What gains and constants are off by is the same in both. No core resolves more than float32 does.
         resolved = float(np.spacing(np.float32(abs(other.value))))
-        return abs(one.value - other.value) > _CLASH * math.hypot(one.se_noise, other.se_noise, resolved)
+        return abs(one.value - other.value) > CLASH * math.hypot(one.se_noise, other.se_noise, resolved)
 
     @property
     def identifier(self) -> str:
@@ -299,7 +299,7 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
     # Where the analysis publishes another estimate of the same equations, its distance belongs to the model's part.
     apart = np.abs(found.p - run.p)
     noise = np.hypot(found.noise, np.sqrt(np.diag(covariance)))
-    shifts = np.vstack([found.shifts, np.where(apart > _CLASH * noise, apart, 0.0)])
+    shifts = np.vstack([found.shifts, np.where(apart > CLASH * noise, apart, 0.0)])
     shifts = shifts[:0] if drifts else shifts
 
     def values(verdict: Verdict) -> Mapping[str, Value]:

@@ -82,7 +82,7 @@ class Base:
 
     Attributes
     ----------
-    standard : place of the first of them, whose column stands for all
+    standard : place of the first of them, whose column is that of all
     parts : (place, factor) of all, the first with 1
     """
 

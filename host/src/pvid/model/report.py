@@ -36,7 +36,7 @@ def robot_report(compiled: CompiledModel) -> str:
     lines = [
         f"{compiled.title}: {len(chain.joints)} joints, {len(chain.base)} base parameters, {chain.inertial} of them "
         f"of the bodies; {program.cost} a sample.",
-        "Identifiable: all base parameters, given enough excitation. A parameter with _R stands for a combination:",
+        "Identifiable: all base parameters, given enough excitation. A parameter with _R is a combination:",
         "",
     ]
     for one in chain.base:

@@ -68,9 +68,10 @@ def white_noise(values: npt.ArrayLike, inputs: list[Float], least: float = 0.0) 
     x = np.asarray(values, np.float64)[:_MOST_SAMPLES]
     if len(x) < _LEAST_SAMPLES:
         return None
-    fast, slower = _differences(x, 1, 6), _differences(x, 2, 3)
+    fast = _differences(x, 1, 6)
     if not _spread(fast) > least:  # NaN, too
         return None
+    slower = _differences(x, 2, 3)
     quiet = np.arange(len(fast)) >= _LAGS  # behind the first, which have no earlier inputs
     columns = []
     for fast_input in (_differences(u[:_MOST_SAMPLES], 1, 6) for u in inputs):

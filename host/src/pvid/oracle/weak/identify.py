@@ -29,7 +29,7 @@ from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows, record_of
 from pvid.oracle.weak.rows import ready as ready
 from pvid.oracle.weak.samples import explains, of_samples
 from pvid.oracle.weak.scale import of_scale
-from pvid.oracle.weak.shared import or_nan
+from pvid.oracle.weak.shared import Cause, or_nan
 from pvid.oracle.weak.solve import DivergedError, Fit, batch, online
 from pvid.oracle.weak.verdict import Attempts, Halves, Judged, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
@@ -46,10 +46,7 @@ class Identified:
     se : published standard errors, those of gains included [n_p]
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
     by_clock : what p is off by over the relative error of the sample rate, 0 where the model has none [n_p]
-    by_neglect : what p may be off by because equations are linearised [n_p]
-    gains
-        what p is off by for one standard deviation of each constant, gain and clock that has any, in this order, and
-        by_neglect [gains, n_p]
+    causes : of the scale part: constants, gains and the clock that have a standard deviation, neglected terms
     by_model : what p may be off by because the equations lack something, or a signal is not what was recorded [n_p]
     lacking : what the equations seem to lack; None: the numbers of the test ran away
     named : the terms that explain it; None: nothing is lacking that moves a parameter visibly
@@ -91,8 +88,7 @@ class Identified:
     allowance: float
     by_gain: dict[str, Float]
     by_clock: Float
-    by_neglect: Float
-    gains: Float
+    causes: tuple[Cause, ...]
     by_model: Float
     lacking: Missing | None
     named: Explained | None
@@ -102,6 +98,16 @@ class Identified:
     def values(self) -> dict[str, tuple[float, float]]:
         """name -> (value, standard error)."""
         return {name: (float(p), float(se)) for name, p, se in zip(self.names, self.p, self.se, strict=True)}
+
+    @property
+    def gains(self) -> Float:
+        """What p is off by for one standard deviation of each of the causes [causes, n_p]."""
+        return np.array([one.moves for one in self.causes])
+
+    @property
+    def by_neglect(self) -> Float:
+        """What p may be off by because equations are linearised [n_p]."""
+        return self.causes[-1].moves
 
     @property
     def noise(self) -> Float:
@@ -228,11 +234,11 @@ def _judged(
         for one in compiled.signals
         if one.gain_sd > 0 or one.unit != "rad"
     }
-    by_clock = or_nan(fit, library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
-    gains = [one.moves for one in shared.of_scale(library)]
+    by_clock = or_nan(fit, lambda: library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
+    causes = tuple(shared.of_scale(library))
     parts = [
         verdict.widened(found.se, halves),
-        *gains,
+        *(one.moves for one in causes),
         *([] if blurred is None else [blurred]),
         *([] if white is None else [white - fit.p]),
     ]
@@ -289,8 +295,7 @@ def _judged(
         allowance=units,
         by_gain=by_gain,
         by_clock=by_clock,
-        by_neglect=gains[-1],
-        gains=np.array(gains),
+        causes=causes,
         by_model=by_model,
         lacking=lacking,
         named=named,

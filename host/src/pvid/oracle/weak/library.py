@@ -81,11 +81,16 @@ class Library:
 
     def by_gain(self, name: str) -> Float:
         """What p is off by if a signal is recorded (1 + g) times as large as it is, over g [n_p]."""
-        recorded = self.recorded(name)
-        if not recorded.top:
-            return np.zeros(len(self.fit.p))
-        return self.scores.shift(self.act(recorded, GAIN, 0.0))
+        if name not in self._by_gain:
+            recorded, none = self.recorded(name), np.zeros(len(self.fit.p))
+            self._by_gain[name] = self.scores.shift(self.act(recorded, GAIN, 0.0)) if recorded.top else none
+        return self._by_gain[name]
 
+    @cached_property
+    def _by_gain(self) -> dict[str, Float]:
+        return {}
+
+    @cached_property
     def by_clock(self) -> Float:
         """What p is off by if samples come (1 + g) times as fast as the sample rate is said to be, over g [n_p]."""
         whole = replace(self.design, window_s=2 * self.design.hop * self.design.dt)  # as many steps at any rate

@@ -50,7 +50,7 @@ def of_scale(library: Library) -> list[Cause]:
         if one.gain_sd:
             out.append(_cause(fit, f"gain of {one.name}", one.gain_sd, partial(library.by_gain, one.name)))
     if model.clock_sd:
-        out.append(_cause(fit, "sample rate", model.clock_sd, library.by_clock))
+        out.append(_cause(fit, "sample rate", model.clock_sd, lambda: library.by_clock))
     part = neglected(model, run)
     return [*out, Cause("neglected terms", ready(model).parameters.positive * fit.p * part)]
 
