@@ -1,15 +1,9 @@
 /* What both verdicts of the strong form must say, of blocks of rows that are all alike: included by the tests of each,
  * which say what a block is. */
+#include "test.h"
+
 #ifndef MISFIT_CASES_H
 #define MISFIT_CASES_H
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 /* A block of rows with residuals e, which say `told` of p[0]: whether it is a misfit. */
 static bool block(double e, double sensitivity);
@@ -19,14 +13,12 @@ static int start_again(void **state);
 
 static void first_block_sets_the_reference(void **state)
 {
-    (void)state;
     assert_false(block(1.0, 1.0)); /* q = 1 */
     assert_true(block(1.0, 1.0));
 }
 
 static void misfit_beyond_the_upper_limit(void **state)
 {
-    (void)state;
     (void)block(0.0632, 1.0); /* q = 0.003994 */
     assert_false(block(0.0632, 1.0));
     assert_false(block(0.062, 1.0));
@@ -37,7 +29,6 @@ static void misfit_beyond_the_upper_limit(void **state)
 
 static void three_times_the_quietest_in_both_is_a_misfit(void **state)
 {
-    (void)state;
     (void)block(0.01, 1.0);
     assert_false(block(0.0170, 1.0));
     assert_false(block(0.01732, 1.0)); /* 2.9998 times */
@@ -51,7 +42,6 @@ static void three_times_the_quietest_in_both_is_a_misfit(void **state)
 
 static void a_quieter_block_becomes_the_reference(void **state)
 {
-    (void)state;
     (void)block(0.05, 1.0);
     assert_false(block(0.02, 1.0));
     assert_true(block(0.05, 1.0));
@@ -59,7 +49,6 @@ static void a_quieter_block_becomes_the_reference(void **state)
 
 static void no_misfit_below_the_lower_limit(void **state)
 {
-    (void)state;
     (void)block(1.0e-6, 1.0);
     assert_false(block(4.4e-3, 1.0));
     assert_false(block(4.472e-3, 1.0)); /* q = 1.99988e-5 */
@@ -69,7 +58,6 @@ static void no_misfit_below_the_lower_limit(void **state)
 
 static void no_signal_gives_no_verdict(void **state)
 {
-    (void)state;
     assert_false(block(0.0, 0.0));
     assert_false(block(1.0, 0.0));
     assert_false(block(0.01, 1.0)); /* still the first that teaches */

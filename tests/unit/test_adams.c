@@ -1,12 +1,5 @@
 /* The weights of Adams's steps are the integrals of the polynomials that they stand for. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "refine/refine_adams_f32.h"
 
@@ -29,7 +22,6 @@ static double weight_of(int k, int positions)
 
 static void test_weights_are_integrals_of_binomials(void **state)
 {
-    (void)state;
     (void)job_behind_step; /* the header's other functions */
     (void)step;
     for (int k = 0; k <= (int)AB; k++) {
@@ -41,7 +33,6 @@ static void test_weights_are_integrals_of_binomials(void **state)
 /* With accelerations t^6 the predicted change is exact, and that of t^7 is once it is corrected. */
 static void test_a_step_of_a_polynomial_is_exact(void **state)
 {
-    (void)state;
     for (int degree = 0; degree <= 7; degree++) {
         static pvid_refine_pass_f32 pass;
         memset(&pass, 0, sizeof pass);

@@ -1,11 +1,7 @@
 /* pvid/arithmetic.h: this build computes float32 as the twin does. */
-#include <fenv.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
+#include "test.h"
 
-#include <cmocka.h>
+#include <fenv.h>
 
 #if defined(__SSE__)
 #include <xmmintrin.h>
@@ -15,7 +11,6 @@
 
 static void test_this_build_has_no_fault(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_arithmetic_faults_f32(), 0);
 }
 
@@ -32,7 +27,6 @@ static uint32_t faults_with(int rounding)
  * would; the root of 2, whose nearest float lies below, and a third, whose nearest lies above. */
 static void test_another_rounding_is_found(void **state)
 {
-    (void)state;
     assert_int_equal(faults_with(FE_UPWARD), 1 | 4 | 8);
     assert_int_equal(faults_with(FE_DOWNWARD), 4 | 16);
     assert_int_equal(faults_with(FE_TOWARDZERO), 4 | 16);
@@ -42,7 +36,6 @@ static void test_another_rounding_is_found(void **state)
 #if defined(__SSE__)
 static void test_flushed_subnormals_are_found(void **state)
 {
-    (void)state;
     const unsigned int before = _mm_getcsr();
     _mm_setcsr(before | 0x8000u);
     const volatile float normal = 1.17549435e-38f;

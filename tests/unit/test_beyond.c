@@ -1,12 +1,5 @@
 /* What is beyond float32, a format or a counter is told, held or refused, each by itself. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/state_q31.h"
 #include "kapitza_plant_q31.h"
@@ -19,7 +12,6 @@
 
 static void a_place_is_a_number_within_the_bounds(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
     config.model = &parameters;
     config.update_rate_hz = 1.0f;
@@ -45,7 +37,6 @@ static pvid_weak_q31 identifier;
 
 static void a_weight_beyond_its_counter_is_its_end(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_weak_init_q31(&identifier, &kapitza_config_q31), PVID_OK);
     pvid_information_q31 *information = &identifier.estimator.information;
     pvid_estimate_q31 estimate;
@@ -63,7 +54,6 @@ static void a_weight_beyond_its_counter_is_its_end(void **state)
 
 static void a_snapshot_of_the_other_core_is_of_another_kind(void **state)
 {
-    (void)state;
     static pvid_weak_f32 single;
     static uint8_t image[PVID_SNAPSHOT_WEAK_Q31];
     static uint8_t image_of_single[PVID_SNAPSHOT_WEAK_F32];

@@ -1,11 +1,5 @@
 /* The equilibrated factorisation: its accuracy, its verdicts, and the written-out order three. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/cholesky_f32.h"
 
@@ -41,7 +35,6 @@ static const float units[PVID_MAX_P] = {1.0e-6f, 3.0e4f, 1.0f, 7.0e2f};
 
 static void solving_returns_what_was_multiplied(void **state)
 {
-    (void)state;
     for (int trial = 0; trial < 2000; trial++) {
         const uint8_t n = (uint8_t)(1 + (trial % PVID_MAX_P));
         float s[PVID_MAX_P][PVID_MAX_P];
@@ -72,7 +65,6 @@ static void solving_returns_what_was_multiplied(void **state)
 
 static void order_three_has_the_bits_of_the_general_order(void **state)
 {
-    (void)state;
     /* A 4 x 4 matrix whose first index is decoupled eliminates its last three as a 3 x 3 one does. */
     for (int trial = 0; trial < 2000; trial++) {
         float three[PVID_MAX_P][PVID_MAX_P];
@@ -100,7 +92,6 @@ static void order_three_has_the_bits_of_the_general_order(void **state)
 
 static void first_pivot_is_one_minus_r_squared(void **state)
 {
-    (void)state;
     const float r = 0.8f;
     const float s[PVID_MAX_P][PVID_MAX_P] = {{4.0f, r * 6.0f}, {r * 6.0f, 9.0f}};
     pvid_cholesky_f32 factor;
@@ -110,7 +101,6 @@ static void first_pivot_is_one_minus_r_squared(void **state)
 
 static void indefinite_matrix_is_refused(void **state)
 {
-    (void)state;
     const float infinity = 3.4e38f * 10.0f;
     const float nan = infinity - infinity;
     const float bad[6][3] = {
@@ -131,7 +121,6 @@ static void indefinite_matrix_is_refused(void **state)
 
 static void scaling_a_parameter_by_a_power_of_two_scales_its_solution_exactly(void **state)
 {
-    (void)state;
     for (int trial = 0; trial < 500; trial++) {
         float s[PVID_MAX_P][PVID_MAX_P];
         float scaled[PVID_MAX_P][PVID_MAX_P];
@@ -163,7 +152,6 @@ static void scaling_a_parameter_by_a_power_of_two_scales_its_solution_exactly(vo
 
 static void inverse_times_matrix_is_one(void **state)
 {
-    (void)state;
     float s[PVID_MAX_P][PVID_MAX_P];
     float inverse[PVID_MAX_P][PVID_MAX_P];
     random_matrix(4, s, units);

@@ -1,12 +1,5 @@
 /* The fixed-point factor and solve, against float64, and what is left where there is none. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/cholesky_q31.h"
 
@@ -34,7 +27,6 @@ static void make(size_t n, double off, int32_t s[][PVID_MAX_P], double exact[][P
 
 static void solving_returns_what_was_multiplied(void **state)
 {
-    (void)state;
     for (uint8_t n = 1; n <= PVID_MAX_P; n++) {
         for (int k = 0; k < 50; k++) {
             int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
@@ -72,7 +64,6 @@ static void solving_returns_what_was_multiplied(void **state)
 
 static void indefinite_matrix_gives_zero_first_pivot(void **state)
 {
-    (void)state;
     for (uint8_t n = 2; n <= PVID_MAX_P; n++) {
         int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
         for (size_t i = 0; i < n; i++) {
@@ -90,7 +81,6 @@ static void indefinite_matrix_gives_zero_first_pivot(void **state)
 
 static void only_eliminated_columns_are_read(void **state)
 {
-    (void)state;
     int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
     for (size_t i = 0; i < PVID_MAX_P; i++) {
         s[i][i] = (1 << 30) - 1;
@@ -105,7 +95,6 @@ static void only_eliminated_columns_are_read(void **state)
 
 static void a_block_keeps_its_largest_entry_in_so_many_bits(void **state)
 {
-    (void)state;
     int32_t out[3];
     const int64_t nothing[3] = {0, 0, 0};
     assert_int_equal(pvid_to_block_q31(3, nothing, 30, out), -30);
@@ -126,7 +115,6 @@ static void a_block_keeps_its_largest_entry_in_so_many_bits(void **state)
 
 static void a_scale_ends_at_the_widest(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_scale_q31(1, -61), (int64_t)1 << 61);
     const int32_t beyond[4] = {-62, -63, -64, -1000};
     for (int i = 0; i < 4; i++) {

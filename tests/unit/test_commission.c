@@ -1,13 +1,6 @@
 /* The commissioning of a small mechanism, x' = a u - b x + c + d sgn(u): each verdict, a ring that holds a burst and
  * one that is a queue, aborts, and what init refuses. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "first_order.h"
 #include "pvid/commission.h"
@@ -140,7 +133,6 @@ static void assert_done(const pvid_commission_result_f32 *result)
 
 static void it_identifies_and_checks_on_a_second_burst(void **state)
 {
-    (void)state;
     set_up();
     assert_done(run(3));
     assert_true(pvid_commission_start_f32(&self)); /* and again */
@@ -148,7 +140,6 @@ static void it_identifies_and_checks_on_a_second_burst(void **state)
 
 static void a_short_ring_is_a_queue(void **state)
 {
-    (void)state;
     set_up();
     config.passes = 1u;
     config.ring_ticks = 8u;
@@ -159,7 +150,6 @@ static void a_short_ring_is_a_queue(void **state)
 
 static void the_outcome_does_not_depend_on_when_work_is_called(void **state)
 {
-    (void)state;
     set_up();
     const pvid_commission_result_f32 first = *run(1);
     set_up();
@@ -170,7 +160,6 @@ static void the_outcome_does_not_depend_on_when_work_is_called(void **state)
 
 static void without_motion_it_is_not_excited(void **state)
 {
-    (void)state;
     set_up();
     for (size_t i = 0; i < excite.parts; i++) {
         part[i].amplitude = 1.0e-6f;
@@ -182,7 +171,6 @@ static void without_motion_it_is_not_excited(void **state)
 
 static void within_too_tight_limits_it_blames_them(void **state)
 {
-    (void)state;
     set_up();
     guard.soft_low = -0.4f; /* x stays at c / b = 0.25 without a drive */
     guard.soft_high = 0.2505f;
@@ -199,7 +187,6 @@ static void within_too_tight_limits_it_blames_them(void **state)
 
 static void soft_limits_hold_the_motion_and_hard_ones_abort(void **state)
 {
-    (void)state;
     set_up();
     guard.soft_low = -0.1f;
     guard.soft_high = 0.4f;
@@ -223,7 +210,6 @@ static void soft_limits_hold_the_motion_and_hard_ones_abort(void **state)
 
 static void another_mechanism_in_the_second_burst_does_not_fit(void **state)
 {
-    (void)state;
     set_up();
     assert_int_equal(pvid_commission_init_f32(&self, &config), PVID_OK);
     assert_true(pvid_commission_start_f32(&self));
@@ -242,7 +228,6 @@ static void another_mechanism_in_the_second_burst_does_not_fit(void **state)
 
 static void it_is_aborted_in_every_state(void **state)
 {
-    (void)state;
     for (int at = 0; at < 40; at++) {
         set_up();
         assert_int_equal(pvid_commission_init_f32(&self, &config), PVID_OK);
@@ -265,7 +250,6 @@ static void it_is_aborted_in_every_state(void **state)
 
 static void a_sensor_that_fails_aborts(void **state)
 {
-    (void)state;
     set_up();
     assert_int_equal(pvid_commission_init_f32(&self, &config), PVID_OK);
     assert_true(pvid_commission_start_f32(&self));
@@ -282,7 +266,6 @@ static void a_sensor_that_fails_aborts(void **state)
 
 static void without_a_drive_it_identifies_what_moves_by_itself(void **state)
 {
-    (void)state;
     set_up();
     config.drives = 0u;
     assert_int_equal(pvid_commission_init_f32(&self, &config), PVID_OK);
@@ -314,7 +297,6 @@ static void assert_refused(pvid_status status)
 
 static void every_bad_field_is_refused_by_name(void **state)
 {
-    (void)state;
     set_up();
     const float bad[3] = {NAN, -1.0f, 1.0e30f};
     for (int k = 0; k < 3; k++) {

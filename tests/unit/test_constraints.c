@@ -1,15 +1,9 @@
 /* Constraints of the float core, on normal equations written by hand. The library of the tests has none (config.h), so
  * the module is compiled here with room for two. */
+#include "test.h"
+
 #undef PVID_MAX_CONSTRAINTS
 #define PVID_MAX_CONSTRAINTS 2
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "solve/constraints_f32.c"
 
@@ -42,7 +36,6 @@ static const pvid_solve_settings_f32 settings = {
 
 static void test_a_step_with_its_return_is_newton_s(void **state)
 {
-    (void)state;
     float p[3] = {3.0f, 5.0f, 2.0f};
     radius = 5.0f;
     assert_true(pvid_constraints_return_f32(&of_circle, &settings, p, 20));
@@ -60,7 +53,6 @@ static void test_a_step_with_its_return_is_newton_s(void **state)
 /* With dp = n + C pi the projected equations are those of pi: C^T (S dp - F) = 0 and A dp = -g, whatever the pivots. */
 static void test_the_projected_equations_give_the_constrained_least_squares(void **state)
 {
-    (void)state;
     const float p[3] = {3.0f, 4.5f, 2.9f};
     const float whole[3][3] = {{4.0f, 1.0f, 0.5f}, {1.0f, 3.0f, -0.25f}, {0.5f, -0.25f, 2.0f}};
     const float f[3] = {1.0f, -2.0f, 0.5f};
@@ -107,7 +99,6 @@ static void test_the_projected_equations_give_the_constrained_least_squares(void
 
 static void test_redundant_constraints_are_left_out_and_contradictory_ones_never_met(void **state)
 {
-    (void)state;
     float p[3] = {3.0f, 4.0f, 1.0f};
     pvid_constraints_f32 ties;
     radius = 0.0f;
@@ -120,7 +111,6 @@ static void test_redundant_constraints_are_left_out_and_contradictory_ones_never
 
 static void test_a_parameter_at_its_bound_depends_last(void **state)
 {
-    (void)state;
     const float p[3] = {9.0f, -8.0f, 0.0f};
     pvid_constraints_f32 ties;
     radius = 0.0f;

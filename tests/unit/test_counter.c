@@ -1,10 +1,5 @@
 /* Counters that start over, at any modulus: the difference of two readings is the motion of the encoder. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/counter.h"
 
@@ -19,7 +14,6 @@ static uint32_t remainder_of(int64_t x, uint32_t one)
 /* Motions of up to half the modulus, forwards and backwards, from every place about the ends of the range. */
 static void the_difference_is_the_motion_of_the_encoder(void **state)
 {
-    (void)state;
     for (size_t i = 0; i < sizeof modulus / sizeof modulus[0]; i++) {
         const int64_t whole = (modulus[i] != 0u) ? (int64_t)modulus[i] : ((int64_t)1 << 32);
         const int64_t largest = (whole - 1) / 2;
@@ -36,7 +30,6 @@ static void the_difference_is_the_motion_of_the_encoder(void **state)
 
 static void a_reading_beyond_the_modulus_is_its_remainder(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_counter_difference(4001u, 3999u, 4000u), -2);
     assert_int_equal(pvid_counter_difference(0u, 0xFFFFFFFFu, 256u), -1);
     assert_int_equal(pvid_counter_difference(0u, 0u, 1u), 0);

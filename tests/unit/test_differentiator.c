@@ -1,11 +1,5 @@
 /* Derivatives of polynomials are exact, at the window's centre, whatever the stride. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/pvid.h"
 
@@ -24,7 +18,6 @@ static double polynomial(int order, double t)
 
 static void quartic_is_differentiated_exactly_at_the_centre(void **state)
 {
-    (void)state;
     for (uint16_t stride = 1; stride <= 8; stride++) {
         const float rate = 64.0f; /* a power of two: sample times are exact */
         const pvid_fir_bank_f32 bank = {.half = 2, .stride = stride, .weights = pvid_five_points_f32};
@@ -53,7 +46,6 @@ static void quartic_is_differentiated_exactly_at_the_centre(void **state)
 
 static void constant_has_no_derivative_not_even_by_rounding(void **state)
 {
-    (void)state;
     const pvid_fir_bank_f32 bank = {.half = 2, .stride = 3, .weights = pvid_five_points_f32};
     pvid_differentiator_f32 self;
     assert_int_equal(pvid_differentiator_init_f32(&self, &bank, 1000.0f), PVID_OK);
@@ -69,7 +61,6 @@ static void constant_has_no_derivative_not_even_by_rounding(void **state)
 
 static void reset_equals_a_fresh_start(void **state)
 {
-    (void)state;
     const pvid_fir_bank_f32 bank = {.half = 2, .stride = 2, .weights = pvid_five_points_f32};
     pvid_differentiator_f32 used;
     pvid_differentiator_f32 fresh;
@@ -94,7 +85,6 @@ static void reset_equals_a_fresh_start(void **state)
 /* A point of a block is its sum in order, whatever came before; there is a result for each block. */
 static void blocks_are_the_points_of_a_slower_window(void **state)
 {
-    (void)state;
     enum { HALF = 4, BLOCK = 9, STRIDE = 2, WINDOW = (2 * HALF * STRIDE) + 1, POINTS = 100000 };
     float weights[PVID_ORDERS * HALF];
     for (int i = 0; i < PVID_ORDERS * HALF; i++) {
@@ -128,7 +118,6 @@ static void blocks_are_the_points_of_a_slower_window(void **state)
 
 static void the_longest_window_is_taken_and_no_longer_one(void **state)
 {
-    (void)state;
     static float weights[PVID_ORDERS * PVID_MAX_WINDOW];
     pvid_differentiator_f32 self;
     const uint16_t most = (PVID_MAX_WINDOW - 1) / 2;

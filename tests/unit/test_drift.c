@@ -1,16 +1,9 @@
 /* Forgetting along a drift, on sums written by hand. The library of the tests has none (config.h), so the module is
  * compiled here with room for two. */
+#include "test.h"
+
 #undef PVID_MAX_DRIFTS
 #define PVID_MAX_DRIFTS 2
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "solve/drift_f32.c"
 
@@ -48,7 +41,6 @@ static const pvid_model_f32 model = {.n_theta = 3,
 
 static void test_only_what_is_known_along_the_drift_grows_old(void **state)
 {
-    (void)state;
     static pvid_estimator_f32 self; /* all zeros */
     self.model = &model;
     self.settings.drift_keep = 0.75f;

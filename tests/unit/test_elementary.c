@@ -1,11 +1,5 @@
 /* Sine, cosine and sign against the library's own in double. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/elementary.h"
 
@@ -32,7 +26,6 @@ static void assert_error_below(double bound, float limit)
 
 static void errors_are_those_of_the_header(void **state)
 {
-    (void)state;
     assert_error_below(1.3e-7, 1.6f);
     assert_error_below(1.3e-7, 1000.0f);
     assert_error_below(3.0e-7, PVID_ANGLE_LIMIT_F32);
@@ -40,7 +33,6 @@ static void errors_are_those_of_the_header(void **state)
 
 static void results_never_exceed_one(void **state)
 {
-    (void)state;
     for (int32_t k = -5000; k <= 5000; k++) {
         const float x = (float)k * 1.57079633f;
         assert_true(fabsf(pvid_sin_f32(x)) <= 1.0f);
@@ -53,7 +45,6 @@ static void results_never_exceed_one(void **state)
 
 static void beyond_the_limit_there_is_no_number(void **state)
 {
-    (void)state;
     static const float beyond[] = {16384.002f, -16384.002f, 3.0e38f, INFINITY, -INFINITY, NAN};
     for (size_t i = 0; i < sizeof beyond / sizeof beyond[0]; i++) {
         assert_true(isnan(pvid_sin_f32(beyond[i])));
@@ -65,7 +56,6 @@ static void beyond_the_limit_there_is_no_number(void **state)
 
 static void tanh_is_that_of_the_library_within_its_error(void **state)
 {
-    (void)state;
     double worst = 0.0;
     for (int32_t i = -100000; i <= 100000; i++) {
         const float x = 9.0f * ((float)i / 100000.0f);
@@ -82,7 +72,6 @@ static void tanh_is_that_of_the_library_within_its_error(void **state)
 
 static void signs_are_plain_or_soft(void **state)
 {
-    (void)state;
     assert_true(pvid_sign_f32(1.0e-40f) == 1.0f);
     assert_true(pvid_sign_f32(-3.0f) == -1.0f);
     assert_true(pvid_sign_f32(-0.0f) == 0.0f);

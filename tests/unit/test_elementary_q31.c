@@ -1,11 +1,5 @@
 /* Sine, cosine, sign and quotients in integers against the library's own in double. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/elementary_q31.h"
 
@@ -19,7 +13,6 @@ static double fixed(int32_t x, int32_t bits)
 /* Every format, angles of every size in it: within 4e-9 and 1.2e-10 of the angle. */
 static void errors_are_those_of_the_header(void **state)
 {
-    (void)state;
     for (uint32_t bits = 0; bits <= 30u; bits++) {
         for (int64_t x = -INT32_MAX; x <= INT32_MAX; x += 2147489) {
             const int32_t given = (int32_t)x;
@@ -40,7 +33,6 @@ static void errors_are_those_of_the_header(void **state)
 
 static void signs_are_plain_or_soft(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_sign_q31(5), ONE);
     assert_int_equal(pvid_sign_q31(INT32_MIN), -ONE);
     assert_int_equal(pvid_sign_q31(0), 0);
@@ -52,7 +44,6 @@ static void signs_are_plain_or_soft(void **state)
 
 static void products_round_half_up_and_quotients_towards_0(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_fixed_product_q31(3, 1, 1), 2);
     assert_int_equal(pvid_fixed_product_q31(-3, 1, 1), -1);
     assert_int_equal(pvid_fixed_product_q31(ONE, -ONE, 30), -ONE);
@@ -67,7 +58,6 @@ static void products_round_half_up_and_quotients_towards_0(void **state)
 
 static void limits_are_inclusive(void **state)
 {
-    (void)state;
     static const int32_t limit[2] = {5, 7};
     static const int32_t inside[2] = {-5, 7};
     static const int32_t above[2] = {5, 8};
@@ -85,7 +75,6 @@ static double value_of(pvid_scaled_q31 a)
 
 static void scaled_functions_are_those_of_real_numbers(void **state)
 {
-    (void)state;
     for (int32_t e = -60; e <= 0; e++) {
         for (int32_t m = 1 - ONE; m <= (ONE - 100000007); m += 100000007) {
             const pvid_scaled_q31 a = pvid_scaled_of_q31(m, e);
@@ -107,7 +96,6 @@ static void scaled_functions_are_those_of_real_numbers(void **state)
 
 static void quotients_have_the_sign_of_both(void **state)
 {
-    (void)state;
     const pvid_scaled_q31 six = pvid_scaled_of_q31(6, 0);
     const pvid_scaled_q31 minus_two = pvid_scaled_of_q31(-2, 0);
     assert_true(value_of(pvid_scaled_quotient_q31(six, minus_two)) == -3.0);
@@ -120,7 +108,6 @@ static void quotients_have_the_sign_of_both(void **state)
 /* Its error is that of the header, 2^-26; it is odd, and 1 far out. */
 static void the_hyperbolic_tangent_is_that_of_real_numbers(void **state)
 {
-    (void)state;
     static const int32_t widths[] = {1, 1000, 123456, 300000000, INT32_MAX};
     for (size_t i = 0; i < sizeof widths / sizeof widths[0]; i++) {
         const int64_t step = (widths[i] / 97) + 1;

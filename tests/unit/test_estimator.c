@@ -1,12 +1,5 @@
 /* The estimator: what it refuses, what it counts, what it never does, and a model of the user's own. */
-#include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/staged_f32.h"
 #include "solve/state_f32.h"
@@ -100,7 +93,6 @@ static void feed(pvid_estimator_f32 *estimator, int rows)
 
 static void own_model_is_identified(void **state)
 {
-    (void)state;
     const pvid_law laws[2] = {PVID_LAW_STATIONARY, PVID_LAW_PSEUDOVELOCITY};
     const float within[2] = {1.0e-5f, 0.05f}; /* float32's rounding; (5) alone keeps part of its first error */
     for (int i = 0; i < 2; i++) {
@@ -115,7 +107,6 @@ static void own_model_is_identified(void **state)
 
 static void standard_errors_of_own_model_match_the_noise(void **state)
 {
-    (void)state;
     /* y with uniform noise of +-0.05: sd 0.05/sqrt(3). With rows uniform in +-1, M = rows/3 I, so
      * se(b) = sd sqrt(3/rows) and se(a) = that / sqrt(1 + 4 a^2) */
     pvid_estimator_config_f32 config = own_config();
@@ -137,7 +128,6 @@ static void standard_errors_of_own_model_match_the_noise(void **state)
 /* Rows that fit to the last digit: what is published is no surer than the sensors allow. */
 static void no_standard_error_is_smaller_than_the_sensors_allow(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     pvid_estimator_f32 estimator = started(&config);
     pvid_estimate_f32 estimate;
@@ -163,7 +153,6 @@ static void no_standard_error_is_smaller_than_the_sensors_allow(void **state)
 
 static void the_misfit_is_the_residual_variance_over_what_is_explained(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     pvid_estimator_f32 estimator = started(&config);
     pvid_estimate_f32 estimate;
@@ -190,7 +179,6 @@ static void the_misfit_is_the_residual_variance_over_what_is_explained(void **st
 /* A long way with large sums costs the residual its digits: what may be lost is counted, and fades as the sums do. */
 static void rounding_of_long_steps_widens_the_errors(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     config.divider = 1000;
     config.step_limit = 0.9f;
@@ -212,7 +200,6 @@ static void rounding_of_long_steps_widens_the_errors(void **state)
 
 static void b_follows_the_estimate(void **state)
 {
-    (void)state;
     /* b = sum N (Y - N^T theta) at the present theta: kept by moving, checked by summing again in double */
     enum { ROWS = 500 };
     static float n[ROWS][3], y[ROWS];
@@ -246,7 +233,6 @@ static void b_follows_the_estimate(void **state)
 
 static void unusable_row_changes_nothing_but_its_counter(void **state)
 {
-    (void)state;
     const float bad[4] = {INFINITE, -INFINITE, NOT_A_NUMBER, 2.0e14f};
     pvid_estimator_config_f32 config = own_config();
     pvid_estimator_f32 estimator = started(&config);
@@ -273,7 +259,6 @@ static void unusable_row_changes_nothing_but_its_counter(void **state)
 
 static void divider_solves_every_third_row(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     config.divider = 3;
     config.kappa_min = 0.0f;
@@ -290,7 +275,6 @@ static void divider_solves_every_third_row(void **state)
 
 static void add_and_update_have_the_bits_of_step(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     config.forgetting_s = 1.0f;
     pvid_estimator_f32 one = started(&config);
@@ -307,7 +291,6 @@ static void add_and_update_have_the_bits_of_step(void **state)
 
 static void iterating_goes_on_to_the_least_squares_solution(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     config.divider = 100; /* one solve at the end, then more on the same sums */
     pvid_estimator_f32 estimator = started(&config);
@@ -323,7 +306,6 @@ static void iterating_goes_on_to_the_least_squares_solution(void **state)
 
 static void no_step_is_longer_than_its_limit_and_none_leaves_the_bounds(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     config.kappa_min = 0.0f;
     config.step_limit = 0.05f;
@@ -344,7 +326,6 @@ static void no_step_is_longer_than_its_limit_and_none_leaves_the_bounds(void **s
 
 static void without_excitation_the_start_is_held(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     pvid_estimator_f32 estimator = started(&config);
     const float zero[3] = {0.0f, 0.0f, 0.0f};
@@ -361,7 +342,6 @@ static void without_excitation_the_start_is_held(void **state)
 
 static void estimate_before_data_is_the_start(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     pvid_estimator_f32 estimator = started(&config);
     for (int rows = 0; rows < 8; rows++) {
@@ -381,7 +361,6 @@ static void estimate_before_data_is_the_start(void **state)
 
 static void counters_stop_at_their_end(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     pvid_estimator_f32 estimator = started(&config);
     memset(&estimator.counters, 0xFF, sizeof estimator.counters);
@@ -394,7 +373,6 @@ static void counters_stop_at_their_end(void **state)
 
 static void a_new_init_equals_a_fresh_object(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = own_config();
     static pvid_estimator_f32 used;
     static pvid_estimator_f32 fresh;
@@ -407,7 +385,6 @@ static void a_new_init_equals_a_fresh_object(void **state)
 
 static void a_place_is_within_the_bounds_and_moves_no_more_than_p(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
     config.model = &own_model;
     config.row_sd = 0.1f;
@@ -440,7 +417,6 @@ static void a_place_is_within_the_bounds_and_moves_no_more_than_p(void **state)
 
 static void rows_of_a_group_add_their_squares(void **state)
 {
-    (void)state;
     pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
     config.model = &own_model;
     config.row_sd = 0.1f;
@@ -467,7 +443,6 @@ static void rows_of_a_group_add_their_squares(void **state)
 
 static void a_start_s_deviation_has_its_range(void **state)
 {
-    (void)state;
     static const struct {
         float start_sd;
         pvid_status status;

@@ -1,13 +1,5 @@
 /* The fixed-point estimator: what init refuses, rows that do not fit, a solve in stages and at once, the way back. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "number/scaled_q31.h"
 #include "pendulum_model_q31.h"
@@ -24,7 +16,6 @@ static pvid_estimator_solve_q31 solve;
 /* w, d1, d2 of 2, 3, 1 and c of 0. */
 static int start_again(void **state)
 {
-    (void)state;
     memset(&config, 0, sizeof config);
     config.model = &pendulum_model_q31;
     for (int i = 0; i < 4; i++) {
@@ -79,7 +70,6 @@ static void add_rows(uint32_t first, uint32_t last)
  * a zone wider than the way is not left at all. */
 static void within_the_dead_zone_p_stays(void **state)
 {
-    (void)state;
     config.dead_zone = 1u << 16;
     begin();
     add_rows(0, 60);
@@ -107,7 +97,6 @@ static void within_the_dead_zone_p_stays(void **state)
  * to rest.) */
 static void a_wider_dead_zone_is_left_less_often(void **state)
 {
-    (void)state;
     const int32_t gains[2] = {1 << 30, 1 << 29};
     for (int i = 0; i < 2; i++) {
         uint32_t steps[3];
@@ -137,7 +126,6 @@ static void a_wider_dead_zone_is_left_less_often(void **state)
 
 static void gauss_newton_steps_end_at_the_parameters_that_made_the_rows(void **state)
 {
-    (void)state;
     begin();
     add_rows(0, 100);
     assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
@@ -154,7 +142,6 @@ static void gauss_newton_steps_end_at_the_parameters_that_made_the_rows(void **s
 
 static void a_row_beyond_its_format_changes_nothing_but_the_counter(void **state)
 {
-    (void)state;
     begin();
     add_rows(0, 5);
     const pvid_estimator_q31 before = estimator;
@@ -172,7 +159,6 @@ static void a_row_beyond_its_format_changes_nothing_but_the_counter(void **state
 
 static void a_solve_in_stages_is_the_solve_at_once(void **state)
 {
-    (void)state;
     begin();
     add_rows(0, 60);
     static pvid_estimator_q31 other;
@@ -201,7 +187,6 @@ static void a_solve_in_stages_is_the_solve_at_once(void **state)
 /* Held for want of information, p goes to its fallback, and b with it: as if the rows had been met there. */
 static void p_goes_to_the_fallback_if_it_may_not_step(void **state)
 {
-    (void)state;
     config.kappa_min = (1 << 30) - (1 << 21); /* no data are that good */
     begin();
     add_rows(0, 60);
@@ -229,7 +214,6 @@ static void p_goes_to_the_fallback_if_it_may_not_step(void **state)
 /* Before there are rows the start is what is known. */
 static void without_rows_the_start_is_published(void **state)
 {
-    (void)state;
     begin();
     pvid_estimate_q31 estimate;
     pvid_estimator_assess_q31(&estimator, &estimate);
@@ -300,7 +284,6 @@ static void own_row(double part)
 /* S must exceed margin times what noise alone gives so many rows of the same weight; that of `noise_rows` is known. */
 static void information_of_noise_alone_moves_nothing(void **state)
 {
-    (void)state;
     const double margins[] = {0.9, 1.1};
     for (int i = 0; i < 2; i++) {
         begin_own();
@@ -319,7 +302,6 @@ static void information_of_noise_alone_moves_nothing(void **state)
 /* kappa of p[0] times its information with the prior's must be twice the prior's, that of p[0] and of no other. */
 static void p0_needs_more_information_than_its_start(void **state)
 {
-    (void)state;
     const double parts[] = {0.9, 1.1};
     for (int i = 0; i < 2; i++) {
         begin_own();
@@ -341,7 +323,6 @@ static void p0_needs_more_information_than_its_start(void **state)
  */
 static void a_projection_is_exact_but_for_its_products(void **state)
 {
-    (void)state;
     static const int32_t m[3] = {1073741823, -987654321, 1012345678}; /* M_11, M_12, M_22 */
     static const uint8_t row[4] = {0, 1, 0, 1};
     static const uint8_t column[4] = {0, 0, 1, 1};

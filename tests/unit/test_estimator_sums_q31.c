@@ -1,15 +1,8 @@
 /* The fixed-point estimator where its sums no longer fit, at its limits, and with as many entries as there is room for:
  * the same parameters as from rows that are small. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
+#include "test.h"
 
-#include <cmocka.h>
+#include <stdlib.h>
 
 #include "number/count.h"
 #include "solve/assess_q31.h"
@@ -63,7 +56,6 @@ static uint32_t generator;
 
 static int start_again(void **state)
 {
-    (void)state;
     memset(&config, 0, sizeof config);
     config.model = &model;
     for (size_t i = 0; i < PVID_MAX_P; i++) {
@@ -113,7 +105,6 @@ static double p_of(const pvid_estimator_q31 *estimator, size_t i)
  * smaller than they would be. */
 static void result_is_invariant_to_row_scale(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 small;
     static pvid_estimator_q31 large;
     static pvid_estimate_q31 estimate[2];
@@ -167,7 +158,6 @@ static void result_is_invariant_to_row_scale(void **state)
 /* A start that is worth as much as 1500 rows takes half of a step away, also where the sums were divided by four. */
 static void the_start_weighs_the_same_beside_sums_of_any_size(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 small;
     static pvid_estimator_q31 large;
     pvid_model_q31 measured = model;
@@ -209,7 +199,6 @@ static pvid_scaled_q31 variance_of(const pvid_estimator_q31 *estimator)
 /* What is expected of the noise, before there are rows to tell, is in the sums' unit as well. */
 static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 estimator;
     assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
     for (uint8_t exponent = 0; exponent < 4u; exponent++) {
@@ -234,7 +223,6 @@ static void the_expected_noise_is_in_the_unit_of_the_sums(void **state)
 /* Of rows with noise of +-100, uniform, twice, exactly and half as much as the sensors explain, in sums of any unit. */
 static void the_residuals_are_weighed_against_what_the_sensors_explain(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 estimator;
     pvid_estimate_q31 estimate;
     const double noise = 100.0 * 101.0 / 3.0;
@@ -265,7 +253,6 @@ static void the_residuals_are_weighed_against_what_the_sensors_explain(void **st
 /* What is expected of all rows is a mean over them that fades as they do. */
 static void expected_variance_is_a_mean_over_remaining_rows(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 estimator;
     assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
     for (int i = 0; i < 100; i++) {
@@ -288,7 +275,6 @@ static void expected_variance_is_a_mean_over_remaining_rows(void **state)
 
 static void a_row_at_its_limit_fits(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 estimator;
     for (size_t i = 0; i < PVID_MAX_P; i++) {
         config.start[i] = 0;
@@ -318,7 +304,6 @@ static void a_row_at_its_limit_fits(void **state)
 
 static void a_place_is_held_within_the_bounds(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 estimator;
     assert_int_equal(pvid_estimator_init_q31(&estimator, &config), PVID_OK);
     const int64_t values[5] = {5, -5, ((int64_t)1 << 40), -((int64_t)1 << 40), 16 * P_ONE};
@@ -334,7 +319,6 @@ static void a_place_is_held_within_the_bounds(void **state)
 /* The last parameter runs into its bound, and every longer step is cut short. */
 static void steps_are_limited_and_bounded(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 estimator;
     config.upper[3] = 36 * (P_ONE / 64); /* the truth is 0.6, 38.4 of these */
     config.lower[1] = -P_ONE / 4;        /* -0.5 */
@@ -368,7 +352,6 @@ static void steps_are_limited_and_bounded(void **state)
  * minimum within the bounds, found here by projected coordinate steps in double. */
 static void the_others_are_solved_beside_bounds_that_act(void **state)
 {
-    (void)state;
     static pvid_estimator_q31 estimator;
     config.upper[0] = P_ONE / 2;  /* the truth is 0.75 */
     config.lower[1] = -P_ONE / 4; /* -0.5 */
@@ -416,7 +399,6 @@ static void the_others_are_solved_beside_bounds_that_act(void **state)
 
 static void counters_stop_at_their_end(void **state)
 {
-    (void)state;
     uint32_t wide = UINT32_MAX - 2u;
     uint16_t narrow = UINT16_MAX - 2u;
     for (uint32_t i = 0; i < 4u; i++) {

@@ -1,14 +1,8 @@
 /* The excitation: what it sums, its limits on 10 000 random tables, limits and mechanisms, soft start and stop, aborts,
  * and what init refuses. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
+#include "test.h"
 
-#include <cmocka.h>
+#include <stdlib.h>
 
 #include "pvid/excite.h"
 
@@ -64,7 +58,6 @@ static float about(double low, double high)
 
 static void a_tone_is_the_sine_of_the_table(void **state)
 {
-    (void)state;
     const pvid_excite_config_f32 config = plain(&sine);
     begin(&config);
     for (int k = 0; k < 600; k++) {
@@ -77,7 +70,6 @@ static void a_tone_is_the_sine_of_the_table(void **state)
 
 static void a_chirp_turns_at_its_ends(void **state)
 {
-    (void)state;
     const pvid_excite_part_f32 chirp = {PVID_EXCITE_CHIRP, 1.0f, 5.0f, 0.0f, 45.0f, 0.5f, NULL, 0u};
     pvid_excite_config_f32 config = plain(&chirp);
     config.burst_s = 2.0f;
@@ -97,7 +89,6 @@ static void a_chirp_turns_at_its_ends(void **state)
 
 static void a_prbs_has_two_levels_and_the_longest_period(void **state)
 {
-    (void)state;
     const pvid_excite_part_f32 prbs = {PVID_EXCITE_PRBS, 1.5f, 500.0f, 0.3f, 0.0f, 0.0f, NULL, 0u};
     pvid_excite_config_f32 config = plain(&prbs);
     config.burst_s = 1000.0f;
@@ -116,7 +107,6 @@ static void a_prbs_has_two_levels_and_the_longest_period(void **state)
 
 static void steps_follow_their_levels(void **state)
 {
-    (void)state;
     static const float level[3] = {1.0f, -0.5f, 0.0f};
     const pvid_excite_part_f32 steps = {PVID_EXCITE_STEPS, 2.0f, 10.0f, 0.0f, 0.0f, 0.0f, level, 3u};
     const pvid_excite_config_f32 config = plain(&steps);
@@ -131,7 +121,6 @@ static void steps_follow_their_levels(void **state)
 
 static void another_run_is_another_motion(void **state)
 {
-    (void)state;
     const pvid_excite_config_f32 config = plain(&sine);
     float first[300];
     begin(&config);
@@ -153,7 +142,6 @@ static void another_run_is_another_motion(void **state)
 
 static void it_starts_softly_and_ends_at_zero(void **state)
 {
-    (void)state;
     const pvid_excite_config_f32 config = plain(&sine);
     assert_int_equal(pvid_excite_init_f32(&self, &config), PVID_OK);
     assert_true(pvid_excite_step_f32(&self, NULL) == 0.0f);
@@ -179,7 +167,6 @@ static void it_starts_softly_and_ends_at_zero(void **state)
 
 static void a_stop_is_soft_and_an_abort_falls_at_the_slew_rate(void **state)
 {
-    (void)state;
     pvid_excite_config_f32 config = plain(&sine);
     config.slew = 100.0f;
     for (int aborts = 0; aborts < 2; aborts++) {
@@ -206,7 +193,6 @@ static void a_stop_is_soft_and_an_abort_falls_at_the_slew_rate(void **state)
 
 static void a_sensor_that_is_no_number_or_missing_aborts(void **state)
 {
-    (void)state;
     const pvid_excite_guard_f32 guard = {1u, false, -1.0f, -0.8f, 0.8f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f};
     pvid_excite_config_f32 config = plain(&sine);
     config.guard = &guard;
@@ -272,7 +258,6 @@ static void draw(drawn *one)
 /* Neither motion nor garbage in the measurements moves the drive beyond its limits, or faster than its slew rate. */
 static void no_draw_leaves_the_limits_of_the_drive(void **state)
 {
-    (void)state;
     for (int k = 0; k < DRAWS; k++) {
         drawn one;
         draw(&one);
@@ -319,7 +304,6 @@ static void no_draw_leaves_the_limits_of_the_drive(void **state)
  * travel. */
 static void no_draw_leaves_the_limits_of_the_mechanism(void **state)
 {
-    (void)state;
     int turned = 0;
     int aborted = 0;
     for (int k = 0; k < DRAWS; k++) {
@@ -398,7 +382,6 @@ static void assert_refused(const pvid_excite_config_f32 *config, pvid_status sta
 
 static void every_bad_field_is_refused_by_name(void **state)
 {
-    (void)state;
     const float bad[4] = {NAN, INFINITY, -INFINITY, -1.0e30f};
     for (int k = 0; k < 4; k++) {
         pvid_excite_part_f32 part = sine;
@@ -469,7 +452,6 @@ static void every_bad_field_is_refused_by_name(void **state)
 
 static void a_table_by_rule_keeps_its_amplitude(void **state)
 {
-    (void)state;
     pvid_excite_part_f32 part[8];
     for (int k = 0; k < 200; k++) {
         const float low = about(0.01, 100.0);

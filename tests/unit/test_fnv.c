@@ -1,12 +1,6 @@
 /* pvid/fnv.h: FNV-1a, 32 bits, against the published test vectors of Fowler, Noll and Vo: those whose length
  * is a multiple of four bytes, since the library hashes words. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/fnv.h"
 #include "pvid/fnv_q31.h"
@@ -22,13 +16,11 @@ static uint32_t word_of(const char four[4])
 
 static void test_empty_input_is_the_offset_basis(void **state)
 {
-    (void)state;
     assert_int_equal(PVID_FNV_START, 2166136261u);
 }
 
 static void test_published_vectors(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_fnv_word(PVID_FNV_START, word_of("foob")), 0x3F5076EFu);
     assert_int_equal(pvid_fnv_word(PVID_FNV_START, word_of("chon")), 0xAC297727u);
     assert_int_equal(pvid_fnv_word(pvid_fnv_word(PVID_FNV_START, word_of("chon")), word_of("go w")), 0xDD77ED30u);
@@ -38,7 +30,6 @@ static void test_published_vectors(void **state)
  * order, and nothing else. */
 static void test_the_hash_of_an_estimator_is_that_of_its_words(void **state)
 {
-    (void)state;
     enum { P = 2, THETA = 3, MOMENTS = 6, SUMS = MOMENTS + THETA + 2 };
     static pvid_model_f32 model = {.n_theta = THETA, .n_p = P, .n_moments = MOMENTS};
     static pvid_estimator_f32 single;

@@ -1,11 +1,5 @@
 /* The outlier gate: what it learns, what it keeps out, and that it does not stay shut. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/gate.h"
 
@@ -21,7 +15,6 @@ static void start(float sigmas, float patience_s, float memory)
 
 static void disabled_gate_accepts_everything(void **state)
 {
-    (void)state;
     start(0.0f, 0.0f, 4.0f);
     for (int i = 0; i < 20; i++) {
         assert_true(pvid_gate_passes_f32(&gate, (i % 2 == 0) ? 1.0f : 1.0e20f));
@@ -31,7 +24,6 @@ static void disabled_gate_accepts_everything(void **state)
 
 static void gate_scale_is_the_mean_square(void **state)
 {
-    (void)state;
     start(3.0f, 0.0f, 4.0f);
     const float squares[4] = {100.0f, 4.0f, 8.0f, 8.0f};
     const float means[4] = {100.0f, 52.0f, 52.0f - (44.0f / 3.0f), 30.0f};
@@ -50,7 +42,6 @@ static void gate_scale_is_the_mean_square(void **state)
 
 static void gate_passes_nan(void **state)
 {
-    (void)state;
     start(3.0f, 0.0f, 1.0f);
     assert_true(pvid_gate_passes_f32(&gate, 1.0f));
     assert_true(pvid_gate_passes_f32(&gate, NAN));
@@ -61,7 +52,6 @@ static void gate_passes_nan(void **state)
 
 static void the_scale_stays_between_its_floor_and_its_ceiling(void **state)
 {
-    (void)state;
     start(3.0f, 0.0f, 2.0f);
     for (int i = 0; i < 50; i++) {
         assert_true(pvid_gate_passes_f32(&gate, 0.0f));
@@ -80,7 +70,6 @@ static void the_scale_stays_between_its_floor_and_its_ceiling(void **state)
 /* Nothing but outliers: within the time of patience the scale grows by 1e4. */
 static void uninformative_count_is_reset(void **state)
 {
-    (void)state;
     start(3.0f, 2.0f, 1.0f); /* 200 residuals */
     assert_true(pvid_gate_passes_f32(&gate, 1.0f));
     int kept_out = 0;
@@ -105,7 +94,6 @@ static void uninformative_count_is_reset(void **state)
 /* What passes only because outliers have widened the scale is a change; what was usual before them is none. */
 static void opening_gate_reports_a_change(void **state)
 {
-    (void)state;
     start(3.0f, 2.0f, 4.0f);
     for (int i = 0; i < 8; i++) {
         assert_int_equal(pvid_gate_judge_f32(&gate, 1.0f), PVID_GATE_ACCEPTS);
@@ -130,7 +118,6 @@ static void opening_gate_reports_a_change(void **state)
 /* Not a number changes nothing, and a disabled gate reports nothing. */
 static void nan_and_a_disabled_gate_report_no_change(void **state)
 {
-    (void)state;
     start(3.0f, 2.0f, 1.0f);
     (void)pvid_gate_judge_f32(&gate, 1.0f);
     assert_int_equal(pvid_gate_judge_f32(&gate, 9.0e4f), PVID_GATE_REJECTS);

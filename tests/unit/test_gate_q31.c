@@ -1,12 +1,5 @@
 /* The outlier gate in integers: what passes, what the usual size is, patience, what makes no gate. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/pvid_q31.h"
 #include "number/scaled_q31.h"
@@ -37,7 +30,6 @@ static uint32_t feed(int64_t square, uint32_t times)
 
 static void test_disabled_gate_passes_everything_and_keeps_scale(void **state)
 {
-    (void)state;
     make(0, 0);
     const pvid_gate_q31 before = gate;
     assert_int_equal(feed(1, 100), 100);
@@ -47,7 +39,6 @@ static void test_disabled_gate_passes_everything_and_keeps_scale(void **state)
 
 static void test_disabled_until_warmed_up(void **state)
 {
-    (void)state;
     make(4, 0);
     assert_int_equal(feed(1000000000, 10), 10);
     assert_int_equal(gate.judged, 10);
@@ -57,7 +48,6 @@ static void test_disabled_until_warmed_up(void **state)
 
 static void test_the_mean_of_the_first_is_exact(void **state)
 {
-    (void)state;
     make(4, 0);
     assert_int_equal(feed(100, 1), 1); /* in place of the floor, with which it starts */
     assert_int_equal(pvid_scaled_fixed_q31(gate.scale, 0), 100);
@@ -69,7 +59,6 @@ static void test_the_mean_of_the_first_is_exact(void **state)
 
 static void test_limit_is_sigmas_squared_times_the_scale(void **state)
 {
-    (void)state;
     make(4, 0);
     assert_int_equal(feed(100, 40), 40);
     assert_int_equal(feed(1601, 100), 0);
@@ -80,7 +69,6 @@ static void test_limit_is_sigmas_squared_times_the_scale(void **state)
 
 static void test_scale_is_never_below_its_floor(void **state)
 {
-    (void)state;
     make(4, 0);
     assert_int_equal(feed(0, 1000), 1000);
     assert_int_equal(gate.scale.m, number(1).m);
@@ -91,7 +79,6 @@ static void test_scale_is_never_below_its_floor(void **state)
 
 static void test_change_is_accepted_after_the_patience(void **state)
 {
-    (void)state;
     make(4, 300);
     assert_int_equal(feed(1, 100), 100);
     uint32_t refused = 0;
@@ -104,7 +91,6 @@ static void test_change_is_accepted_after_the_patience(void **state)
 
 static void test_without_patience_the_scale_never_widens(void **state)
 {
-    (void)state;
     make(4, 0);
     assert_int_equal(feed(1, 100), 100);
     assert_int_equal(feed(10000, 100000), 0);
@@ -112,7 +98,6 @@ static void test_without_patience_the_scale_never_widens(void **state)
 
 static void test_the_longest_patience_still_widens_it(void **state)
 {
-    (void)state;
     make(2, (uint32_t)1 << 30);
     assert_int_equal(feed(1, 10), 10);
     assert_int_equal(feed(10000, 1000), 0);
@@ -122,7 +107,6 @@ static void test_the_longest_patience_still_widens_it(void **state)
 
 static void test_the_scale_has_an_end(void **state)
 {
-    (void)state;
     make(2, 1);
     assert_int_equal(feed(1, 10), 10);
     const pvid_scaled_q31 huge = {1 << 29, 170};
@@ -136,7 +120,6 @@ static void test_the_scale_has_an_end(void **state)
 
 static void test_memory_is_at_least_one(void **state)
 {
-    (void)state;
     const pvid_gate_config_q31 config = {2u << 16, 0};
     assert_int_equal(pvid_gate_init_q31(&gate, &config, 0, number(1)), PVID_OK);
     assert_int_equal(feed(100, 1), 1);
@@ -151,7 +134,6 @@ static pvid_gate_verdict judge(int64_t square)
 /* What passes only because outliers have widened the scale is a change; what was usual before them is none. */
 static void test_opening_gate_reports_a_change(void **state)
 {
-    (void)state;
     make(4, 300);
     for (int i = 0; i < 100; i++) {
         assert_int_equal(judge(100), PVID_GATE_ACCEPTS);

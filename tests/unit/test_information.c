@@ -1,10 +1,5 @@
 /* The sums must neither stall nor drift nor forget at the wrong rate. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/pvid.h"
 
@@ -47,7 +42,6 @@ static void add_rows(pvid_information_f32 *self, uint32_t rows, const float n[2]
 
 static void ten_million_equal_rows_neither_stall_nor_drift(void **state)
 {
-    (void)state;
     pvid_information_f32 information;
     pvid_information_init_f32(&information, &pair, 0.0f);
     const float n[2] = {0.1f, 3.0f};
@@ -74,7 +68,6 @@ static void ten_million_equal_rows_neither_stall_nor_drift(void **state)
 
 static void small_terms_after_large_ones_are_kept(void **state)
 {
-    (void)state;
     pvid_information_f32 information;
     pvid_information_init_f32(&information, &pair, 0.0f);
     const float large[2] = {4096.0f, 0.0f}; /* squares to 2^24: the next 1 falls off a plain sum */
@@ -91,7 +84,6 @@ static void small_terms_after_large_ones_are_kept(void **state)
 
 static void weight_settles_at_the_time_constant(void **state)
 {
-    (void)state;
     const float constants[4] = {10.0f, 100.0f, 1000.0f, 10000.0f};
     for (int i = 0; i < 4; i++) {
         pvid_information_f32 information;
@@ -111,7 +103,6 @@ static void weight_settles_at_the_time_constant(void **state)
 
 static void reading_changes_nothing_and_adding_reports_what_reading_does(void **state)
 {
-    (void)state;
     pvid_information_f32 information;
     pvid_information_init_f32(&information, &pair, 50.0f);
     const float n[2] = {0.3f, -1.7f};

@@ -1,12 +1,5 @@
 /* The sums of the fixed-point core: exact, fading when it is time to, and never beyond their limit. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/information_q31.h"
 
@@ -34,7 +27,6 @@ static void end_group(void)
 
 static void sums_are_exact(void **state)
 {
-    (void)state;
     start(0);
     const int32_t rows[2][N] = {{3, -5, PVID_ROW_LIMIT_Q31}, {-7, 11, 13}};
     const int32_t errors[2] = {-17, PVID_ROW_LIMIT_Q31};
@@ -62,7 +54,6 @@ static void sums_are_exact(void **state)
 /* Forgetting acts every sixteenth of its time constant, every group where that is short, every 64 at most. */
 static void the_past_fades_by_exp(void **state)
 {
-    (void)state;
     static const uint32_t groups[] = {4, 5, 16, 31, 32, 33, 100, 1000, 1023, 1024, 5000, 1u << 20, 1u << 24};
     static const uint16_t blocks[] = {1, 1, 1, 1, 2, 2, 6, 62, 63, 64, 64, 64, 64};
     for (size_t k = 0; k < sizeof groups / sizeof groups[0]; k++) {
@@ -98,7 +89,6 @@ static void the_past_fades_by_exp(void **state)
  * on; when the sums have faded they come back to where they were. */
 static void sums_keep_below_their_limit(void **state)
 {
-    (void)state;
     start(64);
     const int32_t row[N] = {PVID_ROW_LIMIT_Q31, -PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31 - 1};
     for (int group = 0; group < 200; group++) {
@@ -143,7 +133,6 @@ static void sums_keep_below_their_limit(void **state)
 
 static void any_sum_of_squares_may_be_the_largest(void **state)
 {
-    (void)state;
     for (int which = 0; which < N + 1; which++) {
         start(0);
         int32_t row[N] = {1, 1, 1};
@@ -170,7 +159,6 @@ static void any_sum_of_squares_may_be_the_largest(void **state)
 /* Rows of many kinds add to the residual sum only: it stops at 3 2^60, from which the end of a group divides it. */
 static void residuals_of_many_rows_stop_at_their_limit(void **state)
 {
-    (void)state;
     start(0);
     const int32_t row[N] = {0, 0, 0};
     const int64_t largest = (int64_t)3 << 60;

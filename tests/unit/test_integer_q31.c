@@ -1,10 +1,5 @@
 /* Integer arithmetic against what a wider type or a closed form says. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/cholesky_q31.h"
 #include "number/integer_q31.h"

@@ -1,12 +1,5 @@
 /* Rows of several kinds: M by blocks, against dense arithmetic in double; what init and add refuse. */
-#include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
@@ -78,7 +71,6 @@ static size_t kind_of(size_t i)
 
 static void blocks_lie_behind_each_other(void **state)
 {
-    (void)state;
     const size_t first[N_KINDS] = {0, 2, 3};
     const size_t n[N_KINDS] = {2, 1, 3};
     const size_t moment[N_KINDS] = {0, 3, 4};
@@ -107,7 +99,6 @@ static void blocks_lie_behind_each_other(void **state)
 /* M of some rows of integers by the estimator's sums, and dense in double. */
 static void the_first_kind_begins_at_the_first_theta(void **state)
 {
-    (void)state;
     static const uint8_t ends[2] = {1, 4};
     assert_int_equal(pvid_kind_first(ends, 0), 0);
     assert_int_equal(pvid_kind_first(ends, 1), 1);
@@ -115,7 +106,6 @@ static void the_first_kind_begins_at_the_first_theta(void **state)
 
 static void rows_go_to_the_block_of_their_kind(void **state)
 {
-    (void)state;
     pvid_information_f32 information;
     pvid_information_init_f32(&information, &model, 0.0f);
     information.row_weight = 0.5f;
@@ -159,7 +149,6 @@ static void rows_go_to_the_block_of_their_kind(void **state)
 
 static void products_with_blocks_equal_dense_products(void **state)
 {
-    (void)state;
     const float p[N_P] = {2.0f, 3.0f, 5.0f};
     float c[N_C];
     float packed[MOMENTS];
@@ -251,7 +240,6 @@ static pvid_status init_with(size_t n_kinds, const uint8_t *ends, size_t n_momen
 
 static void kinds_divide_theta_or_are_refused(void **state)
 {
-    (void)state;
     static const uint8_t every[6] = {1, 2, 3, 4, 5, 6};
     static const uint8_t early[2] = {2, 5};
     static const uint8_t late[2] = {2, 7};
@@ -277,7 +265,6 @@ static void kinds_divide_theta_or_are_refused(void **state)
 /* The solution of three rows of each kind without noise. */
 static void several_kinds_find_their_parameters(void **state)
 {
-    (void)state;
     const float truth[N_P] = {1.25f, 0.75f, 3.0f};
     const pvid_estimator_config_f32 fresh = config();
     pvid_estimator_f32 estimator;
@@ -311,7 +298,6 @@ static float b_of(const pvid_estimator_f32 *estimator, size_t i)
 
 static void a_vector_is_added_to_b_or_refused(void **state)
 {
-    (void)state;
     const float fits[N_THETA] = {1.0f, -2.0f, 3.0f, -4.0f, 5.0f, -1.0e28f};
     for (int law = 0; law < 2; law++) {
         pvid_estimator_config_f32 fresh = config();
@@ -395,7 +381,6 @@ static pvid_estimator_config_q31 fixed_config(void)
 
 static void fixed_point_finds_the_parameters_of_several_kinds(void **state)
 {
-    (void)state;
     const float truth[N_P] = {1.25f, 0.75f, 3.0f};
     const pvid_estimator_config_q31 fresh = fixed_config();
     pvid_estimator_q31 estimator;
@@ -427,7 +412,6 @@ static void fixed_point_finds_the_parameters_of_several_kinds(void **state)
 
 static void a_fixed_point_vector_is_added_to_b_or_refused(void **state)
 {
-    (void)state;
     for (int law = 0; law < 2; law++) {
         pvid_estimator_config_q31 fresh = fixed_config();
         fresh.gain = (law == 0) ? (1 << 30) : (1 << 28);
@@ -458,7 +442,6 @@ static pvid_status init_fixed(void)
 
 static void a_fixed_point_model_is_whole_or_refused(void **state)
 {
-    (void)state;
     static const uint8_t early[3] = {2, 3, 5};
     const pvid_model_q31 kept = fixed;
     const pvid_scaled_model_q31 kept_numbers = numbers;
@@ -485,7 +468,6 @@ static void a_fixed_point_model_is_whole_or_refused(void **state)
 /* theta_bits: 40 bits of theta at the start, or of what start_sd changes it by. */
 static void formats_of_theta_follow_the_start(void **state)
 {
-    (void)state;
     pvid_estimator_config_q31 fresh = fixed_config();
     pvid_estimator_q31 estimator;
     assert_int_equal(pvid_estimator_init_q31(&estimator, &fresh), PVID_OK);
@@ -506,7 +488,6 @@ static void formats_of_theta_follow_the_start(void **state)
 
 static void diagonals_are_where_the_packed_rows_begin(void **state)
 {
-    (void)state;
     for (size_t n = 1; n <= 12u; n++) {
         size_t place = 0;
         for (size_t i = 0; i < n; i++) {

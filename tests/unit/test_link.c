@@ -1,11 +1,5 @@
 /* The frame codec: known bytes, every payload length, damage at every place. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "link.h"
 
@@ -24,7 +18,6 @@ static uint32_t feed(const uint8_t bytes[], size_t n, pvid_link_frame *frame)
 
 static void test_every_length_comes_through(void **state)
 {
-    (void)state;
     uint8_t payload[PVID_LINK_MAX_PAYLOAD];
     uint8_t bytes[ROOM];
     pvid_link_decoder_init(&decoder);
@@ -48,7 +41,6 @@ static void test_every_length_comes_through(void **state)
 
 static void test_too_large_frame_is_not_written(void **state)
 {
-    (void)state;
     uint8_t bytes[ROOM + 8u];
     static const uint8_t payload[PVID_LINK_MAX_PAYLOAD + 1];
     memset(bytes, 0xA5, sizeof bytes);
@@ -61,7 +53,6 @@ static void test_too_large_frame_is_not_written(void **state)
 
 static void test_a_flipped_bit_anywhere_loses_one_frame(void **state)
 {
-    (void)state;
     static const uint8_t payload[40] = {1, 0, 2, 0, 0, 3};
     uint8_t bytes[ROOM];
     const pvid_link_frame frame = {PVID_SAMPLE, 1u, 9u, payload, sizeof payload};
@@ -80,7 +71,6 @@ static void test_a_flipped_bit_anywhere_loses_one_frame(void **state)
 
 static void test_missing_frames_are_counted_and_a_restart_is_none(void **state)
 {
-    (void)state;
     static const uint16_t sequence[] = {65534u, 65535u, 0u, 3u, 4u, 0u, 1u};
     uint8_t bytes[ROOM];
     pvid_link_decoder_init(&decoder);
@@ -95,7 +85,6 @@ static void test_missing_frames_are_counted_and_a_restart_is_none(void **state)
 
 static void test_endless_garbage_is_one_loss(void **state)
 {
-    (void)state;
     pvid_link_frame out;
     pvid_link_decoder_init(&decoder);
     for (size_t i = 0; i < 100000u; i++) {

@@ -19,14 +19,12 @@ static bool block(double e, double sensitivity)
 
 static int start_again(void **state)
 {
-    (void)state;
     pvid_misfit_init_f32(&misfit, 10.0f, 0.0f);
     return 0;
 }
 
 static void a_block_is_four_seconds_of_rows(void **state)
 {
-    (void)state;
     assert_int_equal(misfit.block, 40);
     pvid_misfit_init_f32(&misfit, 1.0e6f, 0.0f);
     assert_int_equal(misfit.block, 65535);
@@ -36,7 +34,6 @@ static void a_block_is_four_seconds_of_rows(void **state)
 
 static void reference_fades_with_the_sums(void **state)
 {
-    (void)state;
     pvid_misfit_init_f32(&misfit, 10.0f, 10.0f); /* 1.1 a block */
     grows_by_a_tenth_a_block();
     pvid_misfit_init_f32(&misfit, 10.0f, 1.0e-3f);
@@ -45,7 +42,6 @@ static void reference_fades_with_the_sums(void **state)
 
 static void nan_rows_are_a_misfit_and_keep_the_reference(void **state)
 {
-    (void)state;
     (void)block(0.01, 1.0);
     assert_true(block((double)NAN, 1.0));
     assert_true(block((double)INFINITY, 1.0));

@@ -27,14 +27,12 @@ static bool block(double e, double sensitivity)
 
 static int start_again(void **state)
 {
-    (void)state;
     pvid_misfit_init_q31(&misfit, 50, 0); /* 200 rows: eight, and three times 64 */
     return 0;
 }
 
 static void a_block_is_four_seconds_of_rows(void **state)
 {
-    (void)state;
     assert_int_equal(misfit.block, 200);
     pvid_misfit_init_q31(&misfit, 16383, 0);
     assert_int_equal(misfit.block, 65532);
@@ -48,7 +46,6 @@ static void a_block_is_four_seconds_of_rows(void **state)
 
 static void the_squares_of_a_block_add_up(void **state)
 {
-    (void)state;
     for (int i = 1; i < 200; i++) {
         assert_false(pvid_misfit_add_q31(&misfit, 9, pvid_misfit_signal_q31(80)));
     }
@@ -67,7 +64,6 @@ static void the_squares_of_a_block_add_up(void **state)
 
 static void reference_fades_with_the_sums(void **state)
 {
-    (void)state;
     pvid_misfit_init_q31(&misfit, 50, 500); /* 1.1 a block */
     grows_by_a_tenth_a_block();
     pvid_misfit_init_q31(&misfit, 50, 4);
@@ -78,7 +74,6 @@ static void reference_fades_with_the_sums(void **state)
 
 static void growing_scale_stays_in_range(void **state)
 {
-    (void)state;
     pvid_misfit_init_q31(&misfit, 1, 4);
     misfit.growth = pvid_scaled_of_q31(2, 0);
     (void)block(200.0, 0.01);
@@ -95,7 +90,6 @@ static void growing_scale_stays_in_range(void **state)
 /* The largest rows there are, and what is told of them beyond what is held. */
 static void the_largest_rows_do_not_overflow(void **state)
 {
-    (void)state;
     pvid_misfit_init_q31(&misfit, (uint32_t)1 << 30, 0);
     const int64_t row_max = PVID_ROW_LIMIT_Q31;
     for (int rows = 1; rows < 65535; rows++) {

@@ -1,11 +1,5 @@
 /* Calls before init, after a refused one, and with NULL: defined answers, and nothing is done. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "kapitza_plant_q31.h"
 #include "first_order.h"
@@ -59,7 +53,6 @@ static void call_all(pvid_weak_f32 *one, pvid_weak_q31 *other)
 
 static void static_objects_before_init_do_nothing(void **state)
 {
-    (void)state;
     static const pvid_weak_f32 none;
     memset(&weak, 0, sizeof weak);
     memset(&weak_q31, 0, sizeof weak_q31);
@@ -69,7 +62,6 @@ static void static_objects_before_init_do_nothing(void **state)
 
 static void null_is_an_answer(void **state)
 {
-    (void)state;
     call_all(NULL, NULL);
     assert_null(pvid_weak_estimate_f32(NULL));
     assert_null(pvid_weak_estimate_q31(NULL));
@@ -79,7 +71,6 @@ static void null_is_an_answer(void **state)
 
 static void estimators_before_init_do_nothing(void **state)
 {
-    (void)state;
     static pvid_estimator_f32 estimator;
     static pvid_estimator_q31 estimator_q31;
     const pvid_estimate_f32 none = {.kappa = 0.0f};
@@ -98,14 +89,12 @@ static void estimators_before_init_do_nothing(void **state)
 
 static void a_missing_reading_is_not_ready(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_weak_init_q31(&weak_q31, &kapitza_config_q31), PVID_OK);
     assert_int_equal(pvid_weak_step_q31(&weak_q31, NULL), PVID_NOT_READY);
 }
 
 static void init_refuses_null(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     const pvid_fir_bank_f32 five = {.half = 2, .stride = 20, .weights = pvid_five_points_f32};
     assert_int_equal(pvid_weak_init_f32(NULL, &config), PVID_BAD_POINTER);
@@ -135,7 +124,6 @@ static void init_refuses_null(void **state)
 
 static void estimate_is_read_from_a_ready_object_only(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     pvid_estimate_f32 estimate;
     pvid_estimate_q31 estimate_q31;
@@ -170,7 +158,6 @@ static void estimate_is_read_from_a_ready_object_only(void **state)
 /* Whatever stood in the memory, and whatever the object was before. */
 static void a_refused_init_leaves_an_object_that_does_nothing(void **state)
 {
-    (void)state;
     for (int how = 0; how < 3; how++) {
         pvid_weak_config_f32 config = weak_config();
         pvid_weak_config_q31 other = kapitza_config_q31;
@@ -198,7 +185,6 @@ static void a_refused_init_leaves_an_object_that_does_nothing(void **state)
 
 static void estimators_and_differentiators_do_nothing_either(void **state)
 {
-    (void)state;
     static pvid_estimator_f32 estimator;
     static pvid_estimator_q31 estimator_q31;
     static pvid_differentiator_f32 differentiator;

@@ -1,12 +1,6 @@
 /* A model of the user's own, as init of the estimator accepts or refuses it. All other refusals are tested by
  * tests/core/test_bad_config.py, and under sanitizers by tests/fuzz/fuzz_api.c. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
@@ -145,7 +139,6 @@ static pvid_status init_q31(void)
 
 static void a_float_model_fits_or_is_refused(void **state)
 {
-    (void)state;
     ACCEPTED_F32((void)0);
     REFUSED_F32(config.model = NULL);
     REFUSED_F32(model.theta = NULL);
@@ -173,7 +166,6 @@ static void a_float_model_fits_or_is_refused(void **state)
 
 static void a_fixed_point_model_fits_or_is_refused(void **state)
 {
-    (void)state;
     ACCEPTED_Q31((void)0);
     REFUSED_Q31(fixed_config.model = NULL);
     REFUSED_Q31(fixed.theta = NULL);

@@ -1,12 +1,6 @@
 /* Publications as one context sees them; how they hold while another one writes:
  * tests/core/test_read_while_stepping.py. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
@@ -22,7 +16,6 @@ static pvid_estimate_f32 estimate_of(float value)
 
 static int start_again(void **state)
 {
-    (void)state;
     memset(&shared, 0, sizeof shared);
     memset(&shared_q31, 0, sizeof shared_q31);
     return 0;
@@ -30,7 +23,6 @@ static int start_again(void **state)
 
 static void nothing_is_published_at_first(void **state)
 {
-    (void)state;
     const pvid_estimate_f32 none = {.kappa = 0.0f};
     pvid_estimate_f32 read = estimate_of(1.0f);
     uint32_t number = 7;
@@ -41,7 +33,6 @@ static void nothing_is_published_at_first(void **state)
 
 static void latest_publication_is_read_with_its_number(void **state)
 {
-    (void)state;
     for (uint32_t i = 1; i <= 3u; i++) {
         const pvid_estimate_f32 estimate = estimate_of((float)i);
         const pvid_estimate_q31 estimate_q31 = {.p = {(int32_t)i}, .weight = i};
@@ -61,7 +52,6 @@ static void latest_publication_is_read_with_its_number(void **state)
 /* What an interrupt finds that stops a put in its second half. */
 static void the_copy_is_read_while_the_estimate_is_written(void **state)
 {
-    (void)state;
     const pvid_estimate_f32 estimate = estimate_of(3.0f);
     pvid_publication_put_f32(&shared, &estimate);
     shared.mark.version++;
@@ -76,7 +66,6 @@ static void the_copy_is_read_while_the_estimate_is_written(void **state)
 
 static void versions_come_round_and_numbers_stop(void **state)
 {
-    (void)state;
     shared.mark.version = UINT32_MAX - 1u;
     shared.mark.number[0] = UINT32_MAX;
     const pvid_estimate_f32 estimate = estimate_of(5.0f);
@@ -91,7 +80,6 @@ static void versions_come_round_and_numbers_stop(void **state)
 
 static void null_is_refused(void **state)
 {
-    (void)state;
     static pvid_weak_f32 weak;
     static pvid_weak_q31 weak_q31;
     pvid_estimate_f32 read = estimate_of(1.0f);

@@ -1,13 +1,6 @@
 /* The receiver behind a UART's interrupt: whatever moment a byte comes at, it is neither lost nor does it hold up the
  * next, with a UART that calls as a byte arrives and with one that calls as long as one is there. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "interrupts.h"
 #include "receiver.h"
@@ -131,7 +124,6 @@ void pvid_interrupts_wait(void)
 static void every_byte_comes_in_order(void **state)
 {
     uint8_t bytes[64];
-    (void)state;
     for (uint32_t seed = 0; seed < 64u; seed++) {
         memset(&uart, 0, sizeof uart);
         memset(&core, 0, sizeof core);

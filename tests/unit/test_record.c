@@ -1,12 +1,6 @@
 /* The record of the parameters: its bytes, that the next life takes them, and that everything else is refused and
  * changes nothing. Whole lives with other settings are in tests/core/test_record.py. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "kapitza_plant_q31.h"
 #include "first_order.h"
@@ -30,7 +24,6 @@ static uint8_t damaged[LENGTH];
 /* A life of the identifier in which its estimate becomes valid. */
 static int live(void **state)
 {
-    (void)state;
     design = design_of(&mechanism);
     config = config_of(&design);
     first_order rig = {.generator = 1u};
@@ -73,7 +66,6 @@ static void forge(size_t at, uint32_t word)
 
 static void the_layout_is_that_of_the_header(void **state)
 {
-    (void)state;
     assert_int_equal(LENGTH, 60u);
     assert_int_equal(save(record), 4);
     const uint8_t head[12] = {'P', 'V', 'R', 'C', 1, 4, 60, 0, 0x78, 0x56, 0x34, 0x12};
@@ -98,7 +90,6 @@ static void the_layout_is_that_of_the_header(void **state)
 
 static void a_publication_between_two_pieces_begins_again(void **state)
 {
-    (void)state;
     pvid_record_writer writer = {0, 0, 0};
     (void)save(damaged);
     assert_int_equal(pvid_record_save_weak_f32(&identifier, &writer, MECHANISM, record, LENGTH), PVID_RECORD_MORE);
@@ -114,7 +105,6 @@ static void a_publication_between_two_pieces_begins_again(void **state)
 
 static void only_what_is_published_and_valid_is_saved(void **state)
 {
-    (void)state;
     static const uint8_t none[LENGTH];
     pvid_record_writer writer = {0, 0, 0};
     memset(record, 0, LENGTH);
@@ -137,7 +127,6 @@ static void only_what_is_published_and_valid_is_saved(void **state)
 
 static void the_values_are_the_start_of_the_next_life(void **state)
 {
-    (void)state;
     (void)save(record);
     const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(&identifier);
     config.trust.se_max = 1.0f; /* other settings */
@@ -186,7 +175,6 @@ static void start_another(void)
 /* Every one and every two bits: 480 and 114 960 records. */
 static void every_truncation_and_every_flip_is_refused(void **state)
 {
-    (void)state;
     start_another();
     for (size_t length = 0; length < LENGTH; length++) {
         assert_refused(record, length, (length < 4u) ? PVID_RECORD_NONE : PVID_RECORD_CUT_SHORT);
@@ -209,7 +197,6 @@ static void every_truncation_and_every_flip_is_refused(void **state)
 
 static void whole_records_of_others_name_their_reason(void **state)
 {
-    (void)state;
     start_another();
     const struct {
         size_t at;
@@ -262,7 +249,6 @@ static void save_fixed(void)
 
 static void integers_of_any_format_are_written_as_the_nearest_binary32(void **state)
 {
-    (void)state;
     uint32_t generator = 7u;
     assert_int_equal(pvid_weak_init_q31(&fixed, &kapitza_config_q31), PVID_OK);
     for (int round = 0; round < 2000; round++) {
@@ -287,7 +273,6 @@ static void integers_of_any_format_are_written_as_the_nearest_binary32(void **st
 /* All but the last 24 bits of a value come back; of the other core's records too, which have the same bytes. */
 static void a_record_is_the_start_in_fixed_point(void **state)
 {
-    (void)state;
     const pvid_weak_config_q31 *given = &kapitza_config_q31;
     for (int32_t round = 1; round < 200; round++) {
         assert_int_equal(pvid_weak_init_q31(&fixed, given), PVID_OK);

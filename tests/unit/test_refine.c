@@ -1,14 +1,8 @@
 /* The refinement: motion and columns against double arithmetic, rows and their solution, what init refuses, growth of
  * its blocks, rounding of its signals, ticks at which the weak form is busy. */
-#include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
+#include "test.h"
 
-#include <cmocka.h>
+#include <stdlib.h>
 
 #include "persist/fingerprint_refine_f32.h"
 #include "pvid/fnv_refine.h"
@@ -131,7 +125,6 @@ static pvid_refine_pass_f32 pass;
 
 static void test_the_motion_is_that_of_the_equations(void **state)
 {
-    (void)state;
     double x[4];
     run_pass(&pass, truth, start);
     integrate(truth, start, STEPS, x);
@@ -144,7 +137,6 @@ static void test_the_motion_is_that_of_the_equations(void **state)
 
 static void test_columns_are_derivatives_of_the_motion(void **state)
 {
-    (void)state;
     run_pass(&pass, truth, start);
     for (size_t j = 0; j < PVID_REFINE_COLUMNS; j++) {
         double r[2][N];
@@ -183,7 +175,6 @@ static void test_columns_are_derivatives_of_the_motion(void **state)
 /* Gauss-Newton from a start and parameters that are off. */
 static void test_passes_and_solutions_find_the_truth(void **state)
 {
-    (void)state;
     static const double off[N] = {1.03, 0.98, 1.02, 0.0, 0.0, 0.0, 0.0};
     static const float prior_sd[N] = {0.15f, 0.15f, 0.15f, 0.1f, 0.05f, 0.005f, 0.1f};
     static pvid_refine_solve_f32 solve;
@@ -227,7 +218,6 @@ static void test_passes_and_solutions_find_the_truth(void **state)
 
 static void test_a_row_beyond_the_gate_or_without_residual_is_left_out(void **state)
 {
-    (void)state;
     run_pass(&pass, truth, start);
     const uint16_t all = pass.used;
     measured[50] += 1.0e5f;
@@ -240,7 +230,6 @@ static void test_a_row_beyond_the_gate_or_without_residual_is_left_out(void **st
 
 static void test_sine_and_cosine(void **state)
 {
-    (void)state;
     for (int i = -4000; i <= 4000; i++) {
         const float x = (float)i * 0.005f;
         float s = 0.0f;
@@ -303,7 +292,6 @@ static void refuses(const pvid_refine_config_f32 *config, pvid_status status)
 
 static void test_init_refuses(void **state)
 {
-    (void)state;
     const float nan = pvid_from_bits_f32(0x7FC00000u);
     static const pvid_refine_signal_f32 derived_output[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 3.3f, 100.0f},
                                                              {0, 2, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
@@ -367,7 +355,6 @@ static void test_init_refuses(void **state)
 
 static void test_before_its_init_it_does_nothing(void **state)
 {
-    (void)state;
     static const pvid_refine_f32 zero;
     static pvid_refine_f32 none;
     const float sample[2] = {0.1f, 0.0f};
@@ -395,7 +382,6 @@ static void test_before_its_init_it_does_nothing(void **state)
 
 static void test_the_region_of_the_pendulum_is_that_of_positive_parameters(void **state)
 {
-    (void)state;
     float r[N];
     to_floats(truth, r, N);
     assert_true(pvid_refine_region(r));
@@ -411,7 +397,6 @@ static void test_the_region_of_the_pendulum_is_that_of_positive_parameters(void 
 
 static void test_it_waits_for_the_weak_form(void **state)
 {
-    (void)state;
     const pvid_refine_config_f32 config = good();
     const float sample[2] = {0.1f, 0.0f};
     pvid_refine_estimate_f32 estimate;
@@ -529,7 +514,6 @@ static void is_near_the_truth(void)
 
 static void test_a_search_grows_in_its_first_samples(void **state)
 {
-    (void)state;
     begin_run();
     uint32_t tick = run_until(has_grown, 0);
     assert_int_equal(refinement.taken, 0);
@@ -546,7 +530,6 @@ static void test_a_search_grows_in_its_first_samples(void **state)
 
 static void test_a_longer_block_of_used_samples_is_judged_by_its_own_level(void **state)
 {
-    (void)state;
     begin_run();
     const uint32_t tick = run_until(is_again_at_its_end, 0);
     assert_true(tick < TICKS);
@@ -586,7 +569,6 @@ static void test_a_longer_block_of_used_samples_is_judged_by_its_own_level(void 
 /* The past then has a sixteenth of its weight: a clash of 1 with it is one of 256 with all of it; the limit is 25. */
 static void test_behind_a_refused_longer_block_the_whole_past_is_clashed_with(void **state)
 {
-    (void)state;
     const float variance = 1.0e-4f * 1.0e-4f;
     for (int refused = 0; refused < 2; refused++) {
         begin_run();
@@ -604,7 +586,6 @@ static void test_behind_a_refused_longer_block_the_whole_past_is_clashed_with(vo
 
 static void test_a_search_behind_a_lost_track_remembers_the_refusals(void **state)
 {
-    (void)state;
     begin_run();
     uint32_t tick = run_until(is_published, 0);
     assert_true(refinement.clash < 2.0f);
@@ -624,7 +605,6 @@ static void test_a_search_behind_a_lost_track_remembers_the_refusals(void **stat
  * a factor of 2 from the first pass to the last one, or if the ratio is no number. */
 static void test_a_past_whose_information_depends_on_the_point_is_given_up(void **state)
 {
-    (void)state;
     const float factors[] = {0.49f, 0.51f, 1.0f, 1.99f, 2.01f, NAN};
     const bool adds[] = {false, true, true, true, false, false};
     begin_run();
@@ -651,7 +631,6 @@ static void test_a_past_whose_information_depends_on_the_point_is_given_up(void 
 /* In its first two passes no row is left out: its start is predicted from a first block that may have been short. */
 static void test_the_gate_waits_for_the_third_pass_of_a_second_block(void **state)
 {
-    (void)state;
     begin_run();
     uint32_t tick = run_until(has_taken, 0);
     const pvid_refine_f32 before = refinement;
@@ -699,7 +678,6 @@ static uint32_t number_read(void)
 
 static void test_an_estimate_that_disagrees_is_held_and_the_published_one_withdrawn(void **state)
 {
-    (void)state;
     begin_run();
     uint32_t tick = run_until(is_published, 0);
     const uint32_t number = number_read();
@@ -721,7 +699,6 @@ static void test_an_estimate_that_disagrees_is_held_and_the_published_one_withdr
 
 static void test_the_published_estimate_outlives_one_refused_block_and_not_the_loss_of_the_track(void **state)
 {
-    (void)state;
     begin_run();
     uint32_t tick = run_until(is_published, 0);
     assert_int_equal(next_block(NULL, &tick), PVID_UPDATED);
@@ -739,7 +716,6 @@ static void test_the_published_estimate_outlives_one_refused_block_and_not_the_l
 
 static void test_the_best_estimate_is_the_refined_one_while_it_stands(void **state)
 {
-    (void)state;
     pvid_estimate_f32 best;
     pvid_estimate_f32 weak = weak_estimate();
     for (size_t i = 0; i < PVID_MAX_P; i++) {
@@ -777,7 +753,6 @@ static void test_the_best_estimate_is_the_refined_one_while_it_stands(void **sta
 
 static void test_a_gap_ends_a_longer_block_of_used_samples(void **state)
 {
-    (void)state;
     begin_run();
     const uint32_t tick = run_until(has_taken, 0);
     assert_true(refinement.again);
@@ -801,7 +776,6 @@ static pvid_refine_entry enter(pvid_refine_front_f32 *front, const pvid_refine_c
 
 static void test_rounding_to_counts_leaves_no_bias(void **state)
 {
-    (void)state;
     const pvid_refine_config_f32 config = sampled();
     const float count = 2.0f / 32767.0f;
     static pvid_refine_front_f32 front;
@@ -870,7 +844,6 @@ static int largest_difference(const pvid_refine_front_f32 *front, const pvid_ref
 
 static void test_a_wild_sample_is_left_out(void **state)
 {
-    (void)state;
     static pvid_refine_front_f32 clean;
     static pvid_refine_front_f32 front;
     run_front(&clean, 4.0f, 0u, 0.0f, 0.0f);
@@ -897,7 +870,6 @@ static void test_a_wild_sample_is_left_out(void **state)
 
 static void test_a_jump_is_no_wild_sample_and_becomes_the_usual(void **state)
 {
-    (void)state;
     static pvid_refine_front_f32 front;
     run_front(&front, 4.0f, 1u, 0.0f, 0.2f);
     for (uint32_t i = 0; i < front.next; i++) {
@@ -928,7 +900,6 @@ static uint32_t worked(uint32_t period)
 
 static void test_a_busy_weak_form_does_not_starve_it(void **state)
 {
-    (void)state;
     const uint32_t alone = worked(1u);
     assert_true(alone > 400u);
     for (uint32_t period = 2; period < 10u; period++) {
@@ -938,7 +909,6 @@ static void test_a_busy_weak_form_does_not_starve_it(void **state)
 
 static void test_it_rests_at_so_many_ticks_in_a_row(void **state)
 {
-    (void)state;
     begin_run();
     refinement.config.rests = 3;
     uint32_t tick = run_until(has_taken, 0);
@@ -959,7 +929,6 @@ static void test_it_rests_at_so_many_ticks_in_a_row(void **state)
 
 static int prepare(void **state)
 {
-    (void)state;
     measure();
     simulate();
     return 0;
@@ -969,7 +938,6 @@ static int prepare(void **state)
  * own steps droop too, by (1 + 1/ratio^2)/24. */
 static void test_a_droop_is_that_of_the_samples_of_a_mean(void **state)
 {
-    (void)state;
     static pvid_refine_front_f32 front;
     for (uint16_t ratio = 1; ratio <= 8u; ratio++) {
         pvid_refine_config_f32 config = sampled();
@@ -990,7 +958,6 @@ static void test_a_droop_is_that_of_the_samples_of_a_mean(void **state)
 
 static void test_a_level_below_1_widens_nothing(void **state)
 {
-    (void)state;
     const float level[] = {0.0f, 0.25f, 1.0f, 1.44f, 4.0f};
     const float root[] = {1.0f, 1.0f, 1.0f, 1.2f, 2.0f};
     for (size_t i = 0; i < sizeof level / sizeof level[0]; i++) {
@@ -1003,7 +970,6 @@ static void test_a_level_below_1_widens_nothing(void **state)
 /* Parameters, state, level and reason, each of them; all that is no number is one number. */
 static void test_every_number_of_a_refinement_counts_in_its_hash(void **state)
 {
-    (void)state;
     static pvid_refine_f32 self;
     memset(&self, 0, sizeof self);
     const uint32_t hash = pvid_fnv_refine_f32(5u, &self, PVID_UPDATED);
@@ -1031,7 +997,6 @@ static void test_every_number_of_a_refinement_counts_in_its_hash(void **state)
 /* The sizes, then every constant, acceleration and output at one point. */
 static void test_the_model_s_fingerprint_is_that_of_its_functions(void **state)
 {
-    (void)state;
     float r[PVID_REFINE_PARAMETERS];
     float m[PVID_REFINE_CONSTANTS];
     float x[PVID_REFINE_STATES];

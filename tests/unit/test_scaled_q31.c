@@ -1,11 +1,5 @@
 /* Numbers of 30 digits and any size: each operation against what it says, in double where that is exact enough. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "number/scaled_q31.h"
 
@@ -29,7 +23,6 @@ static void assert_normal(pvid_scaled_q31 a)
 
 static void an_integer_keeps_thirty_digits(void **state)
 {
-    (void)state;
     assert_scaled(pvid_scaled_of_q31(0, 5), 0, -25);
     assert_scaled(pvid_scaled_of_q31(1, 0), 1 << 29, -29);
     assert_scaled(pvid_scaled_of_q31(-1, 7), -(1 << 29), -22);
@@ -45,7 +38,6 @@ static void an_integer_keeps_thirty_digits(void **state)
 
 static void a_shift_and_a_fixed_point_are_exact(void **state)
 {
-    (void)state;
     const pvid_scaled_q31 three = pvid_scaled_of_q31(3, 0);
     assert_true(value_of(pvid_scaled_shifted_q31(three, 100)) == ldexp(3.0, 100));
     assert_true(value_of(pvid_scaled_shifted_q31(three, -100)) == ldexp(3.0, -100));
@@ -61,7 +53,6 @@ static void a_shift_and_a_fixed_point_are_exact(void **state)
 /* Of every sign and many sizes: as near as 30 digits are. */
 static void operations_are_those_of_real_numbers(void **state)
 {
-    (void)state;
     static const int64_t m[] = {1, 3, 7, 1000003, 536870912, 1073741823, 4611686018427387904};
     static const int32_t e[] = {-90, -62, -31, -30, -29, -1, 0, 1, 30, 62};
     for (int i = 0; i < 70 * 70; i++) {
@@ -90,7 +81,6 @@ static void operations_are_those_of_real_numbers(void **state)
 
 static void empty_input_changes_nothing(void **state)
 {
-    (void)state;
     const pvid_scaled_q31 zero = pvid_scaled_of_q31(0, 1000);
     const pvid_scaled_q31 a = pvid_scaled_of_q31(-12345, 6);
     assert_scaled(pvid_scaled_plus_q31(zero, a), a.m, a.e);
@@ -107,7 +97,6 @@ static void empty_input_changes_nothing(void **state)
 /* 20 bits in 2^-19 of it, exponents within +-1000, 0 below. */
 static void a_packed_number_keeps_twenty_bits(void **state)
 {
-    (void)state;
     static const int32_t m[] = {536870912, 536872960, 805306368, 1073739776, 1073741823, -536870912, -1073739777};
     static const int32_t e[] = {0, 7, -999, -1000, 999, 31};
     for (size_t i = 0; i < sizeof m / sizeof m[0]; i++) {

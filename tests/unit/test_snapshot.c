@@ -1,13 +1,7 @@
 /* Saving and restoring an identifier: it continues bit for bit, refuses what is not its own, and power may fail at
  * any byte of a save. The fixed-point core is in test_weak_q31.c, whole runs are in
  * tests/core/test_snapshot_weak.py. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "first_order.h"
 #include "number/fingerprint_numbers_f32.h"
@@ -48,7 +42,6 @@ static size_t save(const pvid_weak_config_f32 *config, uint32_t generation, uint
 /* Saves after every tick of half a window, so in every stage of a window's work, and lets both go on. */
 static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
     first_order rig = {.generator = 1u};
@@ -72,7 +65,6 @@ static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
 /* p goes back to the published estimate, to which the solve in progress then points: into the object itself. */
 static void a_pointer_into_the_object_points_into_the_restored_one(void **state)
 {
-    (void)state;
     pvid_weak_config_f32 config = weak_config();
     config.trust.revert_after = 1;
     assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
@@ -112,7 +104,6 @@ static pvid_snapshot_status restore(const pvid_weak_config_f32 *config, const ui
 /* A bit of every byte: which one goes round. */
 static void every_damaged_byte_is_seen_and_nothing_is_changed(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     for (size_t at = 0; at < PVID_SNAPSHOT_WEAK_F32; at++) {
@@ -130,7 +121,6 @@ static void every_damaged_byte_is_seen_and_nothing_is_changed(void **state)
 
 static void every_length_that_is_too_short_is_refused(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     for (size_t n = 0; n < PVID_SNAPSHOT_WEAK_F32; n++) {
@@ -150,7 +140,6 @@ static void forge(size_t at, uint32_t word)
 
 static void snapshot_of_another_object_names_its_kind(void **state)
 {
-    (void)state;
     const struct {
         size_t at;
         pvid_snapshot_status status;
@@ -173,7 +162,6 @@ static void snapshot_of_another_object_names_its_kind(void **state)
 
 static void a_table_that_changed_is_another_design(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     const float kept = circle[1];
@@ -190,7 +178,6 @@ static uint8_t slot[2][PVID_SNAPSHOT_WEAK_F32];
 
 static void the_format_of_rows_counts(void **state)
 {
-    (void)state;
     pvid_estimator_config_q31 one;
     memset(&one, 0, sizeof one);
     pvid_estimator_config_q31 other = one;
@@ -208,7 +195,6 @@ static void the_format_of_rows_counts(void **state)
 
 static void slots_are_used_in_turn(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     memset(slot, 0xFF, sizeof slot);
@@ -229,7 +215,6 @@ static void slots_are_used_in_turn(void **state)
 
 static void generations_go_round(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     for (uint32_t older = UINT32_MAX - 2u; older != 2u; older++) {
@@ -248,7 +233,6 @@ static void generations_go_round(void **state)
  * slot it is matters to no byte: slots_are_used_in_turn and generations_go_round have both as the newest. */
 static void a_power_cut_at_any_byte_leaves_the_older_snapshot(void **state)
 {
-    (void)state;
     const pvid_weak_config_f32 config = weak_config();
     assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
     first_order rig = {.generator = 1u};
@@ -280,7 +264,6 @@ static void a_power_cut_at_any_byte_leaves_the_older_snapshot(void **state)
 
 static void every_entry_of_a_list_counts_in_a_fingerprint(void **state)
 {
-    (void)state;
     float values[5] = {1.0f, 2.0f, 3.0f, 4.0f, 5.0f};
     const uint32_t hash = pvid_fingerprint_floats(7u, values, 4);
     for (size_t i = 0; i < 5u; i++) {

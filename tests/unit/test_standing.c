@@ -1,11 +1,5 @@
 /* What is said of a published estimate, window by window, and when p starts again: judge/standing.h. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "judge/standing.h"
 
@@ -16,7 +10,6 @@ static pvid_standing_judge judge;
 
 static int start_again(void **state)
 {
-    (void)state;
     memset(&judge, 0, sizeof judge);
     return 0;
 }
@@ -52,7 +45,6 @@ static void is(pvid_standing_state state, uint32_t causes)
 
 static void an_estimate_is_valid_behind_eight_windows_that_fit(void **state)
 {
-    (void)state;
     take(good(), 7);
     is(PVID_STANDING_NONE, 0);
     take(good(), 1);
@@ -66,7 +58,6 @@ static void an_estimate_is_valid_behind_eight_windows_that_fit(void **state)
 
 static void eight_valid_publications_in_a_row_are_trusted(void **state)
 {
-    (void)state;
     const pvid_standing_window window = good();
     for (int i = 1; i <= 20; i++) {
         assert_int_equal(pvid_standing_take(&judge, &window), i >= 15);
@@ -77,7 +68,6 @@ static void eight_valid_publications_in_a_row_are_trusted(void **state)
 
 static void what_contradicts_twice_withdraws(void **state)
 {
-    (void)state;
     const pvid_standing_window other = held(ONE);
     take(good(), 9);
     judge.contradicts = true;
@@ -99,7 +89,6 @@ static void what_contradicts_twice_withdraws(void **state)
 
 static void larger_errors_are_a_doubt_until_the_next_publication(void **state)
 {
-    (void)state;
     judge.grew = true; /* the scatter of the first windows: no estimate is valid yet */
     take(good(), 7);
     is(PVID_STANDING_NONE, 0);
@@ -118,7 +107,6 @@ static void larger_errors_are_a_doubt_until_the_next_publication(void **state)
 /* The limit at 20 degrees of freedom and 32 windows is 1.5 (1 + 3 sqrt(2 / 640)) = 1.75. */
 static void residuals_above_the_noise_are_a_misfit_and_one_window_is_none(void **state)
 {
-    (void)state;
     pvid_standing_window worse = good();
     take(good(), 40);
     worse.ratio = PVID_STANDING_CLIP;
@@ -137,7 +125,6 @@ static void residuals_above_the_noise_are_a_misfit_and_one_window_is_none(void *
 
 static void windows_before_p_arrives_are_no_misfit(void **state)
 {
-    (void)state;
     pvid_standing_window far = held(PVID_STANDING_CLIP);
     far.arrived = false;
     take(far, 50);
@@ -147,7 +134,6 @@ static void windows_before_p_arrives_are_no_misfit(void **state)
 
 static void without_a_limit_of_misfit_there_is_none(void **state)
 {
-    (void)state;
     pvid_standing_window window = good();
     window.judges = false;
     window.ratio = PVID_STANDING_CLIP;
@@ -157,7 +143,6 @@ static void without_a_limit_of_misfit_there_is_none(void **state)
 
 static void six_rejected_windows_of_sixteen_are_a_doubt(void **state)
 {
-    (void)state;
     take(good(), 20);
     for (int i = 0; i < 5; i++) {
         pvid_standing_skip(&judge, true);
@@ -174,7 +159,6 @@ static void six_rejected_windows_of_sixteen_are_a_doubt(void **state)
 
 static void an_opening_withdraws_and_starts_at_the_trusted_p(void **state)
 {
-    (void)state;
     uint8_t number = 9;
     take(good(), 20);
     assert_false(pvid_standing_starts(&judge, true, &number));
@@ -205,7 +189,6 @@ static int until_the_next_start(uint8_t *number)
 
 static void six_starts_in_turn_then_a_pause(void **state)
 {
-    (void)state;
     uint8_t number;
     assert_int_equal(until_the_next_start(&number), 0); /* before the first publication there is nothing else */
     judge.opened = true;
@@ -220,7 +203,6 @@ static void six_starts_in_turn_then_a_pause(void **state)
 
 static void a_misfit_before_the_first_publication_starts_nothing(void **state)
 {
-    (void)state;
     uint8_t number;
     take(held(3 * ONE), 40);
     assert_true(judge.misfit);
@@ -232,7 +214,6 @@ static void a_misfit_before_the_first_publication_starts_nothing(void **state)
 
 static void starts_are_spread_by_a_factor_of_four(void **state)
 {
-    (void)state;
     for (uint32_t a = 0; a < 8u; a++) {
         assert_int_equal(pvid_standing_spread(0, a), 32768);
         assert_int_equal(pvid_standing_spread(5, a), 32768);

@@ -1,13 +1,6 @@
 /* The pure functions of the float core's solve, on normal equations written by hand: no estimator, no model, no sums.
  */
-#include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/assess_f32.h"
 #include "solve/step_f32.h"
@@ -65,7 +58,6 @@ static pvid_solution_f32 solved(const pvid_system_f32 *system, const pvid_solve_
 
 static void a_step_solves_the_equations(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     const pvid_system_f32 system = known_system();
     float p[2];
@@ -79,7 +71,6 @@ static void a_step_solves_the_equations(void **state)
 
 static void the_right_hand_side_may_differ_from_the_force(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     const pvid_system_f32 system = known_system();
     const float rhs[2] = {4.0f, -4.0f};
@@ -94,7 +85,6 @@ static void the_right_hand_side_may_differ_from_the_force(void **state)
 
 static void a_step_in_place_is_the_same(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     const pvid_system_f32 system = known_system();
     float p[2];
@@ -110,7 +100,6 @@ static void a_step_in_place_is_the_same(void **state)
 /* The whole step is shortened by one factor, here 0.4375 over 0.875; its size is that before. */
 static void a_large_step_is_shortened_as_a_whole(void **state)
 {
-    (void)state;
     pvid_solve_settings_f32 settings = wide_settings();
     settings.step_limit = 0.4375f;
     const pvid_system_f32 system = known_system();
@@ -125,7 +114,6 @@ static void a_large_step_is_shortened_as_a_whole(void **state)
 /* S = (8 4; 4 10) with the second at its lower bound and F = (8, -8), which pulls it outwards: the first alone, 8/8. */
 static void a_parameter_that_is_pulled_out_of_its_bound_is_pinned(void **state)
 {
-    (void)state;
     pvid_solve_settings_f32 settings = wide_settings();
     settings.lower[1] = start[1];
     pvid_system_f32 system = known_system();
@@ -149,7 +137,6 @@ static void a_parameter_that_is_pulled_out_of_its_bound_is_pinned(void **state)
 /* F = (8, 2) pulls the second inwards, and dp = (1.125, -0.25) outwards: no step; the next solve pins it. */
 static void a_step_that_leaves_a_bound_waits_for_the_next_solve(void **state)
 {
-    (void)state;
     pvid_solve_settings_f32 settings = wide_settings();
     settings.lower[1] = start[1];
     pvid_system_f32 system = known_system();
@@ -171,7 +158,6 @@ static void a_step_that_leaves_a_bound_waits_for_the_next_solve(void **state)
 
 static void a_step_stops_at_the_bounds(void **state)
 {
-    (void)state;
     pvid_solve_settings_f32 settings = wide_settings();
     settings.upper[0] = 3.0f;
     settings.lower[1] = -1.25f;
@@ -184,7 +170,6 @@ static void a_step_stops_at_the_bounds(void **state)
 
 static void a_singular_system_holds_p(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     pvid_system_f32 system = known_system();
     system.s[0][0] = 1.6f; /* 4^2 / 10: rank one */
@@ -197,7 +182,6 @@ static void a_singular_system_holds_p(void **state)
 
 static void a_number_that_is_none_holds_p(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     const float bad[3] = {NOT_A_NUMBER, INFINITE, -INFINITE};
     float p[2];
@@ -221,7 +205,6 @@ static void a_number_that_is_none_holds_p(void **state)
 /* kappa of the first parameter is 1 - 4^2 / (8 10) = 0.8. */
 static void too_little_excitation_holds_p(void **state)
 {
-    (void)state;
     const pvid_system_f32 system = known_system();
     float p[2];
     pvid_solve_settings_f32 settings = wide_settings();
@@ -243,7 +226,6 @@ static void too_little_excitation_holds_p(void **state)
 /* F^T S^-1 F = 8 1.75 + 8 1.5 = 26; correlation times s^2, the smaller of 4/32 and 0.25, is 0.25. */
 static void no_step_is_taken_in_the_dead_zone(void **state)
 {
-    (void)state;
     pvid_solve_settings_f32 settings = wide_settings();
     pvid_system_f32 system = known_system();
     float p[2];
@@ -266,7 +248,6 @@ static void no_step_is_taken_in_the_dead_zone(void **state)
 /* Covariance = (S / (2 s^2) + 1 / start_sd^2)^-1 with s^2 = 4/32: 4 S + diag(1, 1/16) = (33 16; 16 40.0625). */
 static void the_covariance_is_the_inverse_of_the_information(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     pvid_system_f32 system = known_system();
     pvid_estimate_f32 estimate;
@@ -286,7 +267,6 @@ static void the_covariance_is_the_inverse_of_the_information(void **state)
 
 static void without_information_the_errors_are_those_of_the_start(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     const float bad[4] = {0.0f, NOT_A_NUMBER, INFINITE, -8.0f};
     for (size_t k = 0; k < 4u; k++) {
@@ -307,7 +287,6 @@ static void without_information_the_errors_are_those_of_the_start(void **state)
  */
 static void a_covariance_that_is_none_is_not_published(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     const float inverse[3][2] = {{INFINITE, 1.0f}, {1.0f, -1.0f}, {1.0f, NOT_A_NUMBER}};
     for (size_t k = 0; k < 3u; k++) {
@@ -320,7 +299,6 @@ static void a_covariance_that_is_none_is_not_published(void **state)
 
 static void the_variance_has_its_limits(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     pvid_system_f32 system = known_system();
     assert_true(pvid_assess_variance_f32(&system, &settings) == 0.125f);
@@ -336,7 +314,6 @@ static void the_variance_has_its_limits(void **state)
 
 static void the_misfit_compares_the_residual_with_its_floor(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     pvid_system_f32 system = known_system();
     assert_true(pvid_assess_misfit_f32(&system, &settings) == 0.0f); /* no expectation */
@@ -356,7 +333,6 @@ static void the_misfit_compares_the_residual_with_its_floor(void **state)
 /* 16 x 0.5 x 34 = 272 times the noise of a row; the least eigenvalue of S is 9 - sqrt(17), 0.0179 times that. */
 static void information_is_compared_with_that_of_noise(void **state)
 {
-    (void)state;
     const pvid_solve_settings_f32 settings = wide_settings();
     const pvid_system_f32 system = known_system();
     float little[PVID_MAX_P][PVID_MAX_P] = {{0.0175f, 0.0f}, {0.0f, 0.0175f}};

@@ -1,12 +1,5 @@
 /* The pure functions of the fixed-point core's solve, on normal equations written by hand: no estimator, no model. */
-#include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "solve/assess_q31.h"
 #include "solve/step_q31.h"
@@ -65,7 +58,6 @@ static pvid_solution_q31 stepped(const pvid_solve_settings_q31 *settings, int64_
 
 static void a_step_is_added(void **state)
 {
-    (void)state;
     const pvid_solve_settings_q31 settings = wide_settings();
     int32_t p[2];
     const pvid_solution_q31 solution = stepped(&settings, 1750000, -1500000, p);
@@ -77,7 +69,6 @@ static void a_step_is_added(void **state)
 /* The whole step is shortened by one factor, here 0.4375 over 0.875; its size is that before. */
 static void a_large_step_is_shortened_as_a_whole(void **state)
 {
-    (void)state;
     pvid_solve_settings_q31 settings = wide_settings();
     settings.step_limit = 7 * UNIT_Q16 / 16;
     int32_t p[2];
@@ -90,7 +81,6 @@ static void a_large_step_is_shortened_as_a_whole(void **state)
 /* The largest step that a solve gives, 2^40, and the smallest reference. */
 static void a_step_of_any_size_stops_at_the_bounds(void **state)
 {
-    (void)state;
     pvid_solve_settings_q31 settings = wide_settings();
     settings.upper[0] = 3000000;
     settings.lower[1] = -1250000;
@@ -108,7 +98,6 @@ static void a_step_of_any_size_stops_at_the_bounds(void **state)
 /* kappa of the first parameter is 1 - 4^2 / (8 10) = 0.8; of its 8, 6.4 are its own. */
 static void excitation_is_kappa_and_more_than_the_prior(void **state)
 {
-    (void)state;
     pvid_solve_settings_q31 settings = wide_settings();
     pvid_system_q31 system = known_system(8);
     assert_true(system.factor.positive);
@@ -128,7 +117,6 @@ static void excitation_is_kappa_and_more_than_the_prior(void **state)
 /* Rank one, and no information at all. */
 static void a_singular_system_has_no_factor(void **state)
 {
-    (void)state;
     pvid_system_q31 system = {.s = {{16, 40}, {0, 100}}, .f = {-16, -16}};
     pvid_system_equilibrate_q31(2, (const int64_t (*)[PVID_MAX_P])system.s, system.g, system.q);
     assert_false(pvid_cholesky_factor_q31(&system.factor, 2, (const int32_t (*)[PVID_MAX_P])system.q));
@@ -139,7 +127,6 @@ static void a_singular_system_has_no_factor(void **state)
  */
 static void the_dead_zone_is_measured_in_standard_errors(void **state)
 {
-    (void)state;
     pvid_solve_settings_q31 settings = wide_settings();
     pvid_residual_q31 sums = sums_with(4000000);
     settings.dead_zone = UNIT_Q16 / 2;
@@ -154,7 +141,6 @@ static void the_dead_zone_is_measured_in_standard_errors(void **state)
 
 static void the_residual_gives_the_variance(void **state)
 {
-    (void)state;
     const pvid_solve_settings_q31 settings = wide_settings();
     const pvid_scaled_q31 expected = pvid_scaled_of_q31(62500, 0);
     pvid_residual_q31 sums = sums_with(4000000);
@@ -195,7 +181,6 @@ static pvid_estimate_q31 assessed(pvid_system_q31 *system, const pvid_solve_sett
 /* Covariance = wide^2 (S + wide^2 / start_sd^2)^-1, the root of wide^2 is 10^6: (9 4; 4 11)^-1 with equal start_sd. */
 static void the_covariance_is_the_inverse_of_the_information(void **state)
 {
-    (void)state;
     pvid_solve_settings_q31 settings = wide_settings();
     settings.start_sd[1] = 1000000;
     pvid_system_q31 system = known_system(8);
@@ -210,7 +195,6 @@ static void the_covariance_is_the_inverse_of_the_information(void **state)
 /* A start that says nothing beside a singular S: the errors are start_sd. */
 static void without_a_factor_the_errors_are_those_of_the_start(void **state)
 {
-    (void)state;
     pvid_solve_settings_q31 settings = wide_settings();
     settings.start_sd[0] = INT32_MAX;
     settings.start_sd[1] = INT32_MAX;

@@ -1,18 +1,11 @@
 /* pvid/text.h: every number has a text, and a number that is none has one too. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/former.h"
 #include "pvid/text.h"
 
 static void test_a_reason_is_its_name_in_words(void **state)
 {
-    (void)state;
     assert_string_equal(pvid_reason_text(PVID_UPDATED), "updated");
     assert_string_equal(pvid_reason_text(PVID_HELD_NOT_EXCITED), "held not excited");
     assert_string_equal(pvid_reason_text(PVID_HELD_DISAGREES), "held disagrees");
@@ -20,7 +13,6 @@ static void test_a_reason_is_its_name_in_words(void **state)
 
 static void test_a_status_tells_what_the_field_must_be(void **state)
 {
-    (void)state;
     assert_string_equal(pvid_status_text(PVID_OK), "ok");
     assert_string_equal(pvid_status_text(PVID_BAD_ROW_SD), "bad row sd: not finite or not positive");
     assert_string_equal(pvid_status_text(PVID_BAD_POINTER),
@@ -29,7 +21,6 @@ static void test_a_status_tells_what_the_field_must_be(void **state)
 
 static void test_a_number_that_is_none_has_a_text_too(void **state)
 {
-    (void)state;
     assert_string_equal(pvid_reason_text((pvid_reason)(PVID_HELD_DISAGREES + 1)), "unknown reason");
     assert_string_equal(pvid_status_text((pvid_status)(PVID_BAD_COMMISSION_CHECK + 1)), "unknown status");
     assert_string_equal(pvid_reason_text((pvid_reason)INT32_MAX), "unknown reason");
@@ -37,7 +28,6 @@ static void test_a_number_that_is_none_has_a_text_too(void **state)
 
 static void test_every_status_has_a_text_of_its_own(void **state)
 {
-    (void)state;
     for (int a = 0; a <= (int)PVID_BAD_COMMISSION_CHECK; a++) {
         for (int b = 0; b < a; b++) {
             assert_string_not_equal(pvid_status_text((pvid_status)a), pvid_status_text((pvid_status)b));
@@ -47,7 +37,6 @@ static void test_every_status_has_a_text_of_its_own(void **state)
 
 static void test_the_names_of_version_0_1_mean_the_same(void **state)
 {
-    (void)state;
     const pvid_counters counters = {.held_singular = 3, .in_dead_zone = 5};
     assert_int_equal(PVID_BAD_ANGLE_LIMIT, PVID_BAD_RANGE);
     assert_int_equal(PVID_HELD_PIVOT, 4);

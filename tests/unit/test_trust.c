@@ -1,12 +1,5 @@
 /* Which estimates are published: the gate, the alarm, the way back. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/pvid.h"
 
@@ -47,7 +40,6 @@ static double moved;
 
 static int start_again(void **state)
 {
-    (void)state;
     moved = 0.0;
     pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
     config.model = &model;
@@ -148,7 +140,6 @@ static double published_correlation(int a, int b)
 
 static void nan_counts_as_the_worst(void **state)
 {
-    (void)state;
     for (int i = 0; i < 3 + 8; i++) {
         (void)judge_good((i < 3) ? 1.0 : (double)NAN);
     }
@@ -160,7 +151,6 @@ static void nan_counts_as_the_worst(void **state)
 /* Where rounding may be all that is left of the residuals the sums are renewed, wherever p came from. */
 static void sums_without_digits_fade(void **state)
 {
-    (void)state;
     double left;
     float *yy = &estimator.information.low[estimator.information.n_moments + estimator.information.n_theta];
     *yy = 1.0e-6f;

@@ -1,12 +1,5 @@
 /* Which estimates of the fixed-point core are published: the gate, the alarm, the way back. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pendulum_model_q31.h"
 #include "pvid/pvid_q31.h"
@@ -31,7 +24,6 @@ static double moved;
 
 static int start_again(void **state)
 {
-    (void)state;
     moved = 0.0;
     pvid_estimator_config_q31 config = {.model = &pendulum_model_q31,
                                         .row_sd = 256,
@@ -141,7 +133,6 @@ static double published_correlation(int a, int b)
 /* One group that the model cannot explain at all must not outweigh thousands. */
 static void huge_variance_ratio_is_clamped(void **state)
 {
-    (void)state;
     for (int i = 0; i < 4; i++) {
         an_estimate fine = candidate(0.01, 1.0e-2);
         (void)pvid_trust_judge_q31(&trust, &estimator, PVID_UPDATED, 0, true, (int64_t)1 << 62, 20, &fine);

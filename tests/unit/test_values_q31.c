@@ -1,11 +1,5 @@
 /* From jets to signs, runs and integrals in fixed point, against their definitions. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "number/integer_q31.h"
 #include "pvid/elementary_q31.h"
@@ -74,7 +68,6 @@ static void channels_after(int32_t width, const int32_t jet[], size_t ticks, int
 /* The mean of sgn over the step about k, the argument linear there: v 2/|g|, g the slope, within +-1. */
 static void test_a_sign_is_its_mean_over_a_step(void **state)
 {
-    (void)state;
     static const struct {
         int32_t v[3];
         double mean;
@@ -110,7 +103,6 @@ static void test_a_sign_is_its_mean_over_a_step(void **state)
 /* Twice the sum by trapezoids, from the first step on; its derivative does not begin before it. */
 static void test_a_run_is_the_sum_of_its_derivative_by_trapezoids(void **state)
 {
-    (void)state;
     int32_t jet[12];
     int64_t expected = 0;
     for (int32_t k = 0; k < 12; k++) {
@@ -129,7 +121,6 @@ static void test_a_run_is_the_sum_of_its_derivative_by_trapezoids(void **state)
  * of the third derivative a step, and for a cubic differs by this straight line, which an unknown start takes. */
 static void test_integrals_of_a_cubic_are_those_of_the_rule(void **state)
 {
-    (void)state;
     static const int32_t hard = 0;
     const pvid_weak_integral_q31 integral[1] = {{0, 1}};
     const pvid_weak_design_q31 design = {.model = &model,
@@ -174,7 +165,6 @@ static void test_integrals_of_a_cubic_are_those_of_the_rule(void **state)
 
 static void test_a_constant_at_the_end_is_not_summed(void **state)
 {
-    (void)state;
     pvid_weak_model_q31 other = model;
     assert_int_equal(pvid_weak_summed_q31(&other), GAINS);
     const pvid_weak_channel with[GAINS + 1] = {
@@ -188,7 +178,6 @@ static void test_a_constant_at_the_end_is_not_summed(void **state)
  * derivatives of signals, which are not known there, with that of the first step. */
 static void test_a_run_begins_before_the_first_step(void **state)
 {
-    (void)state;
     static const int32_t hard = 0;
     static const pvid_weak_jet first_order[1] = {{0, 1}};
     const pvid_weak_integral_q31 integral[1] = {{0, 1}};

@@ -1,15 +1,8 @@
 /* The weak form of a small mechanism: jets, sums, rows and estimates against double arithmetic from the definitions;
  * what init refuses; gaps, freezing, samples beyond their range. */
-#include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "test.h"
 
 #include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "first_order.h"
 #include "weak/columns_f32.h"
@@ -35,7 +28,6 @@ static void start(pvid_weak_design_f32 *design, pvid_weak_config_f32 *config)
 
 static void parameters_are_found_within_their_errors(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     start(&design, &config);
@@ -67,7 +59,6 @@ static void parameters_are_found_within_their_errors(void **state)
 /* A larger standard error than that of the assessment: an unknown input that is no noise of the sensors. */
 static void scatter_of_the_windows_widens_the_standard_errors(void **state)
 {
-    (void)state;
     float se[2][4];
     for (int disturbed = 0; disturbed < 2; disturbed++) {
         pvid_weak_design_f32 design;
@@ -104,7 +95,6 @@ static void sum_of(const double channel[2 * HOP], int h, double out[2])
 /* Integrals of x from the window's start by a rule of its own: fine trapezoids of the cubic through the steps. */
 static void sums_are_those_of_the_definition(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     start(&design, &config);
@@ -204,7 +194,6 @@ static double row_entry(int column, size_t row)
 
 static void rows_have_the_moments_of_generalised_least_squares(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     start(&design, &config);
@@ -312,7 +301,6 @@ static double mean_at(int tick, int place, int decimation)
 
 static void jets_are_those_of_the_filters_for_every_decimation(void **state)
 {
-    (void)state;
     pvid_weak_model_f32 model = mechanism;
     model.signals = 3;
     model.signal = derived;
@@ -366,7 +354,6 @@ static void jets_are_those_of_the_filters_for_every_decimation(void **state)
 /* A window needs no more stages than init has counted, and hardly less, and ends before the next one begins. */
 static void stages_are_as_many_as_counted(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     for (int compensation = 0; compensation < 2; compensation++) {
@@ -393,7 +380,6 @@ static void stages_are_as_many_as_counted(void **state)
 
 static void assessment_takes_the_stated_number_of_stages(void **state)
 {
-    (void)state;
     static pvid_weak_f32 weak;
     const pvid_weak_design_f32 design = design_of(&mechanism);
     const pvid_weak_config_f32 settings = config_of(&design);
@@ -417,7 +403,6 @@ static void assessment_takes_the_stated_number_of_stages(void **state)
 
 static void a_window_that_cannot_be_processed_in_time_is_refused(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     start(&design, &config);
@@ -438,7 +423,6 @@ static void a_window_that_cannot_be_processed_in_time_is_refused(void **state)
  */
 static void estimates_do_not_depend_on_the_slices_of_the_schedule(void **state)
 {
-    (void)state;
     float p[2][4];
     for (int slow = 0; slow < 2; slow++) {
         const int d = (slow != 0) ? 8 : 1;
@@ -485,7 +469,6 @@ static uint32_t run(first_order *rig, int ticks, uint32_t reasons[16])
 
 static void a_gap_restarts_the_windows_and_keeps_the_sums(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     uint32_t reasons[16];
@@ -505,7 +488,6 @@ static void a_gap_restarts_the_windows_and_keeps_the_sums(void **state)
 
 static void a_sample_that_is_not_finite_is_rejected_and_restarts(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     uint32_t reasons[16];
@@ -530,7 +512,6 @@ static void a_sample_that_is_not_finite_is_rejected_and_restarts(void **state)
 
 static void a_frozen_identifier_drops_windows_and_resumes(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     uint32_t reasons[16];
@@ -550,7 +531,6 @@ static void a_frozen_identifier_drops_windows_and_resumes(void **state)
 
 static void windows_beyond_a_range_or_without_motion_are_dropped(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     uint32_t reasons[16];
@@ -582,7 +562,6 @@ static void windows_beyond_a_range_or_without_motion_are_dropped(void **state)
 /* A sensor that stands still from one tick on, then moves: windows with one such half are dropped too. */
 static void a_half_without_motion_drops_both_windows_that_it_is_in(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     const float least[2] = {0.0f, 0.1f};
@@ -609,7 +588,6 @@ static void a_half_without_motion_drops_both_windows_that_it_is_in(void **state)
 /* Steps at which a sign is in doubt: up to a twentieth of a half, 2 of 48, are those of a reversal. */
 static void a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_in(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     const float doubt[1] = {0.125f};
@@ -637,7 +615,6 @@ static void a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_i
 
 static void outliers_are_rejected_by_the_gate(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     uint32_t reasons[16];
@@ -662,7 +639,6 @@ static void outliers_are_rejected_by_the_gate(void **state)
  * estimate is withdrawn, and p starts at the trusted one, until the new one is known. */
 static void a_changed_mechanism_withdraws_until_it_is_known_anew(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
     uint32_t reasons[16];
@@ -699,7 +675,6 @@ static void a_changed_mechanism_withdraws_until_it_is_known_anew(void **state)
 
 static void init_names_what_is_out_of_range(void **state)
 {
-    (void)state;
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
 #define REFUSES(what, status)                                                                                          \
@@ -775,7 +750,6 @@ static void init_names_what_is_out_of_range(void **state)
 
 static void an_object_before_its_init_does_nothing(void **state)
 {
-    (void)state;
     static pvid_weak_f32 zero;
     const float sample[2] = {0.0f, 0.0f};
     pvid_estimate_f32 estimate;
@@ -795,7 +769,6 @@ static void an_object_before_its_init_does_nothing(void **state)
 
 static void without_a_second_stage_there_is_no_snapshot_of_one(void **state)
 {
-    (void)state;
     static uint8_t image[PVID_SNAPSHOT_REFINE_F32];
     pvid_weak_design_f32 design;
     pvid_weak_config_f32 config;
@@ -808,7 +781,6 @@ static void without_a_second_stage_there_is_no_snapshot_of_one(void **state)
 
 static void a_nuisance_that_those_before_it_explain_is_skipped(void **state)
 {
-    (void)state;
     const float first[4] = {1.0f, 2.0f, 2.0f, 0.0f};
     float second[4] = {2.0f, 4.0f, 4.0001f, 0.0f};
     const float whole = pvid_product_f32(second, second, 4);

@@ -1,13 +1,6 @@
 /* The variance of an equation's own error, in both cores: when it follows the residuals, and what it does not follow.
  */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
@@ -53,7 +46,6 @@ static void assert_variance(float variance, float part)
 
 static void test_residuals_that_stay_large_raise_it(void **state)
 {
-    (void)state;
     make(2.0f, 2);
     for (int i = 0; i < 3; i++) {
         assert_false(take(101));
@@ -69,7 +61,6 @@ static void test_residuals_that_stay_large_raise_it(void **state)
 
 static void test_residuals_that_are_not_far_off_leave_it_alone(void **state)
 {
-    (void)state;
     make(2.0f, 2);
     for (int i = 0; i < 100; i++) {
         assert_false(take(10));
@@ -79,7 +70,6 @@ static void test_residuals_that_are_not_far_off_leave_it_alone(void **state)
 
 static void test_it_falls_with_them_but_not_below_the_design_s(void **state)
 {
-    (void)state;
     make(7.0f, 7);
     for (int i = 0; i < 4; i++) {
         (void)take(0);
@@ -98,7 +88,6 @@ static void test_it_falls_with_them_but_not_below_the_design_s(void **state)
 
 static void test_single_windows_change_nothing(void **state)
 {
-    (void)state;
     make(2.0f, 2);
     for (int i = 0; i < 50; i++) {
         assert_false(take(((i % 4) == 3) ? 1000000 : 1));
@@ -108,7 +97,6 @@ static void test_single_windows_change_nothing(void **state)
 
 static void test_what_is_no_variance_is_not_taken(void **state)
 {
-    (void)state;
     make(2.0f, 2);
     for (int i = 0; i < 20; i++) {
         left = pvid_weak_error_take_f32(&error, 2.0f, 1.0e30f, 1.0e-30f);
@@ -127,7 +115,6 @@ static void test_what_is_no_variance_is_not_taken(void **state)
 /* The largest mean that fixed point keeps. */
 static void test_the_largest_residual_is_kept(void **state)
 {
-    (void)state;
     make(2.0f, 2);
     for (int i = 0; i < 4; i++) {
         (void)pvid_weak_error_take_q31(&error_q31, pvid_scaled_of_q31(2, 0), pvid_scaled_of_q31(1, 1000));

@@ -1,11 +1,5 @@
 /* The weak form in fixed point, whole: that it identifies, what it refuses, that it survives, that it can be saved. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "kapitza_plant_q31.h"
 #include "weak/weak_front_q31.h"
@@ -26,7 +20,6 @@ static pvid_weak_design_q31 design;
 
 static int start_again(void **state)
 {
-    (void)state;
     design = kapitza_design_q31;
     config = kapitza_config_q31;
     config.design = &design;
@@ -75,7 +68,6 @@ static void assert_near(double value, double truth, double tolerance)
 
 static void the_pendulum_is_identified_with_its_encoders_zero(void **state)
 {
-    (void)state;
     const int32_t zeros[3] = {0, 52, -261}; /* 0.02 and -0.1 rad */
     for (int i = 0; i < 3; i++) {
         start();
@@ -96,7 +88,6 @@ static void the_pendulum_is_identified_with_its_encoders_zero(void **state)
 
 static void a_reading_beyond_full_scale_restarts_windows_and_keeps_sums(void **state)
 {
-    (void)state;
     static const int32_t offset[2] = {-7, 40};
     config.offset = offset;
     start();
@@ -128,7 +119,6 @@ static void a_reading_beyond_full_scale_restarts_windows_and_keeps_sums(void **s
 
 static void a_gap_is_a_reading_beyond_full_scale_without_the_reading(void **state)
 {
-    (void)state;
     static pvid_weak_q31 gapped;
     start();
     plant_state plant = released_plant();
@@ -143,7 +133,6 @@ static void a_gap_is_a_reading_beyond_full_scale_without_the_reading(void **stat
 
 static void start_is_held_with_reason_without_drive(void **state)
 {
-    (void)state;
     start();
     int reasons[16] = {0};
     plant_state plant = released_plant();
@@ -162,7 +151,6 @@ static void start_is_held_with_reason_without_drive(void **state)
 /* A mixture of both laws steps once a window, and forgetting keeps fewer rows. */
 static void laws_and_forgetting_take_their_settings(void **state)
 {
-    (void)state;
     config.estimator.gain = 1 << 29;
     config.estimator.forgetting_groups = 8;
     start();
@@ -183,7 +171,6 @@ static void laws_and_forgetting_take_their_settings(void **state)
 /* While it is frozen every whole window is dropped and nothing moves; then it goes on without warming up again. */
 static void frozen_form_keeps_sums_and_resumes_bumplessly(void **state)
 {
-    (void)state;
     config.estimator.forgetting_groups = 8;
     start();
     plant_state plant = released_plant();
@@ -213,7 +200,6 @@ static void frozen_form_keeps_sums_and_resumes_bumplessly(void **state)
  * they are taken in. */
 static void the_gate_keeps_a_jolt_out(void **state)
 {
-    (void)state;
     for (int gated = 0; gated < 2; gated++) {
         start_again(NULL);
         config.gate.sigmas = (gated == 1) ? (4u << 16) : 0u;
@@ -237,7 +223,6 @@ static void the_gate_keeps_a_jolt_out(void **state)
 /* Any counts within full scale, a pivot that trembles and one that leaps. */
 static void random_counts_keep_every_bound(void **state)
 {
-    (void)state;
     config.drive_min = NULL;
     config.estimator.kappa_min = 0;
     config.estimator.noise_margin = 0;
@@ -262,7 +247,6 @@ static void random_counts_keep_every_bound(void **state)
 /* The stages that a window's work takes are those that init counts with: the last one ends it, not one before. */
 static void a_window_takes_the_stages_that_init_counts_with(void **state)
 {
-    (void)state;
     for (uint8_t iterations = 1; iterations <= 3; iterations++) {
         config.iterations = iterations;
         start();
@@ -289,7 +273,6 @@ static void a_window_takes_the_stages_that_init_counts_with(void **state)
 /* By the compensation, the check for noise, or an error of the first kind's own; else it would be computed in vain. */
 static void the_noise_is_computed_where_it_is_used(void **state)
 {
-    (void)state;
     static const pvid_scaled_q31 own_error[1] = {{1 << 29, -40}};
     start();
     assert_true(identifier.finish.known.used);
@@ -307,7 +290,6 @@ static void the_noise_is_computed_where_it_is_used(void **state)
 /* Seven harmonics of two half windows are joined one at a tick, or four at a tick where a step is one. */
 static void ticks_behind_the_join_are_those_without_harmonics(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_weak_ticks_behind_join_q31(&design), (4 * 23) - 14);
     design.decimation = 1;
     assert_int_equal(pvid_weak_ticks_behind_join_q31(&design), 0);
@@ -322,7 +304,6 @@ static uint8_t again[PVID_SNAPSHOT_WEAK_Q31];
 
 static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
 {
-    (void)state;
     static pvid_weak_q31 restored;
     start();
     plant_state plant = released_plant();
@@ -341,7 +322,6 @@ static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
 
 static void a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read(void **state)
 {
-    (void)state;
     static pvid_weak_q31 before;
     start();
     plant_state plant = released_plant();
@@ -375,7 +355,6 @@ static void a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_no
  * block sums one block more. */
 static void the_lead_is_what_the_front_end_needs(void **state)
 {
-    (void)state;
     for (uint16_t half = 0; half < 5u; half++) {
         const pvid_weak_front_q31 plain = {.decimation = 1, .half = half};
         const pvid_weak_front_q31 derived = {.decimation = 1, .half = half, .needs = 1};
@@ -389,7 +368,6 @@ static void the_lead_is_what_the_front_end_needs(void **state)
 /* Of each tick the sum of what the signals are by their definition; a held one needs the tick behind it. */
 static void signals_of_several_ticks_are_those_of_their_definition(void **state)
 {
-    (void)state;
     static const int32_t counts[8][2] = {{10, -5}, {13, 2}, {-4, 9}, {8, 8}, {0, -7}, {31, 1}, {-2, 4}, {6, 6}};
     static const int32_t zero[2] = {3, -2};
     static const int32_t full_scale[2] = {100, 100};
@@ -440,7 +418,6 @@ static void signals_of_several_ticks_are_those_of_their_definition(void **state)
 /* Between windows a tick that ends no step has nothing to do, and costs little: its answer is there. */
 static void ticks_without_work_have_their_answer(void **state)
 {
-    (void)state;
     start();
     assert_int_equal(identifier.task, PVID_WARMING_UP);
     plant_state plant = released_plant();

@@ -1,12 +1,5 @@
 /* What the weak form in float32 refuses: every count, index, pointer and number of a model and a design. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "first_order.h"
 #include "persist/fingerprint_weak_f32.h"
@@ -62,7 +55,6 @@ static pvid_status validity(void)
 
 static void counts_of_a_model(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_weak_valid_f32(NULL), PVID_BAD_DESIGN);
     GIVES(model.samples = 1; own.signal[1].sample = 0, PVID_OK);
     GIVES(model.signals = 1; own.jet[1].signal = 0, PVID_OK);
@@ -77,7 +69,6 @@ static void counts_of_a_model(void **state)
 
 static void pointers_of_a_model(void **state)
 {
-    (void)state;
     GIVES(model.form = NULL, PVID_BAD_MODEL);
     GIVES(model.prepare = NULL, PVID_BAD_MODEL);
     GIVES((model.prepare = NULL, model.runs = 0), PVID_BAD_MODEL);
@@ -87,7 +78,6 @@ static void pointers_of_a_model(void **state)
 
 static void signals_and_jets(void **state)
 {
-    (void)state;
     GIVES(own.signal[0].source = PVID_SIGNAL_JUMP, PVID_OK);
     GIVES(own.signal[0].source = PVID_SIGNAL_LAST + 1, PVID_BAD_MODEL);
     GIVES(own.jet[0].order = PVID_MAX_POWER + 1, PVID_BAD_MODEL);
@@ -95,7 +85,6 @@ static void signals_and_jets(void **state)
 
 static void channels_and_their_integrals(void **state)
 {
-    (void)state;
     GIVES(own.channel[ONE].fold = 1, PVID_BAD_MODEL);
     GIVES(own.channel[X].gain = 3, PVID_BAD_MODEL);
     GIVES(own.channel[U_I2].fold = 3, PVID_BAD_MODEL);
@@ -124,7 +113,6 @@ static void channels_and_their_integrals(void **state)
 
 static void terms_and_kinds(void **state)
 {
-    (void)state;
     GIVES(own.term[2].channel = CHANNELS, PVID_BAD_MODEL);
     GIVES(own.term[4].column = 5, PVID_BAD_MODEL);
     GIVES(own.term[1].column = 4, PVID_BAD_MODEL); /* before a smaller one */
@@ -159,7 +147,6 @@ static void terms_and_kinds(void **state)
 
 static void sizes_of_a_design(void **state)
 {
-    (void)state;
     GIVES(design.decimation = PVID_MAX_DECIMATION, PVID_OK);
     GIVES(design.power = 0, PVID_BAD_DESIGN);
     GIVES(design.power = POWER + 1, PVID_BAD_DESIGN);
@@ -177,7 +164,6 @@ static void sizes_of_a_design(void **state)
 
 static void tables_of_a_design(void **state)
 {
-    (void)state;
     GIVES(design.compensator = NULL, PVID_BAD_DESIGN);
     GIVES(design.noise = NULL; design.n_noise = 0; own.variance[0] = 1.0f, PVID_OK);
     GIVES(design.n_noise = 0, PVID_BAD_DESIGN);
@@ -221,7 +207,6 @@ static uint32_t fingerprint(void)
  * last, is another one. */
 static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
 {
-    (void)state;
     static const uint8_t others[2] = {2, 4};
     static const uint8_t ends[2] = {1, 4};
     static const uint8_t last[2] = {1, 5};

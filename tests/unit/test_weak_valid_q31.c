@@ -1,12 +1,6 @@
 /* What the weak form in fixed point refuses: every count, index, pointer and number of a model, a design and the
  * configuration. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "kapitza_plant_q31.h"
 #include "persist/fingerprint_weak_q31.h"
@@ -102,7 +96,6 @@ static pvid_status validity(void)
 
 static void counts_of_a_model(void **state)
 {
-    (void)state;
     assert_int_equal(pvid_weak_valid_q31(NULL), PVID_BAD_DESIGN);
     GIVES(model.jets = PVID_MAX_INPUTS + 1, PVID_BAD_MODEL);
     GIVES(WITH_RUN, PVID_OK);
@@ -115,7 +108,6 @@ static void counts_of_a_model(void **state)
 
 static void pointers_of_model_and_design(void **state)
 {
-    (void)state;
     GIVES(design.full_scale = NULL, PVID_BAD_DESIGN);
     GIVES(design.down = NULL, PVID_BAD_DESIGN);
     GIVES(design.filter = NULL, PVID_BAD_DESIGN);
@@ -129,7 +121,6 @@ static void pointers_of_model_and_design(void **state)
 
 static void sizes_of_a_design(void **state)
 {
-    (void)state;
     GIVES(design.power = 0, PVID_BAD_FUNCTIONS);
     GIVES(design.power = 5, PVID_BAD_FUNCTIONS);
     GIVES(design.power = PVID_MAX_POWER + 2, PVID_BAD_FUNCTIONS);
@@ -141,7 +132,6 @@ static void sizes_of_a_design(void **state)
 
 static void tables_of_a_model(void **state)
 {
-    (void)state;
     GIVES(own.signal[1].source = PVID_SIGNAL_LAST + 1, PVID_BAD_MODEL);
     GIVES(own.jet[1].order = PVID_MAX_POWER + 1, PVID_BAD_MODEL);
     GIVES(own.channel[CONSTANT].fold = 1, PVID_BAD_MODEL);
@@ -177,7 +167,6 @@ static void tables_of_a_model(void **state)
 
 static void several_kinds(void **state)
 {
-    (void)state;
     static pvid_weak_kind two[2] = {{3, 0, 0, 6}, {5, 0, 6, 13}};
     static pvid_weak_term_q31 of_two[13] = {{0, 0, 0}, {1, 0, 1}, {2, 0, 2}, {0, 0, 3}, {3, 0, 3}, {4, 0, 3}, {2, 0, 0},
                                             {5, 0, 1}, {6, 0, 2}, {8, 0, 3}, {2, 0, 4}, {5, 0, 5}, {7, 0, 5}};
@@ -202,7 +191,6 @@ static void several_kinds(void **state)
 
 static void full_scales_and_filters(void **state)
 {
-    (void)state;
     GIVES(own.full_scale[0] = 0, PVID_BAD_FULL_SCALE);
     GIVES(own.full_scale[0] = ((int32_t)1 << 24) + 1, PVID_BAD_FULL_SCALE);
     GIVES(own.full_scale[0] = (int32_t)1 << 24, PVID_BAD_FULL_SCALE); /* 24 24 times that exceeds an int32 */
@@ -224,7 +212,6 @@ static void full_scales_and_filters(void **state)
 
 static void noise_of_the_sensors(void **state)
 {
-    (void)state;
     GIVES(own.noise[3].kind = 1, PVID_BAD_DESIGN);
     GIVES(own.noise[3].power = 6, PVID_BAD_DESIGN);
     GIVES(own.noise[3].a = 8; own.noise[3].b = 7, PVID_BAD_DESIGN);
@@ -239,7 +226,6 @@ static void noise_of_the_sensors(void **state)
 
 static void shifts(void **state)
 {
-    (void)state;
     GIVES(design.sum_shift = 0, PVID_BAD_SHIFT);
     GIVES(design.sum_shift = 4, PVID_BAD_SHIFT); /* 32 steps of 29 bits */
     GIVES(design.sum_shift = 16, PVID_OK);
@@ -275,7 +261,6 @@ static void shifts(void **state)
 
 static void the_configuration(void **state)
 {
-    (void)state;
     INIT_GIVES((void)0, PVID_OK);
     assert_int_equal(pvid_weak_init_q31(&identifier, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_weak_init_q31(NULL, &config), PVID_BAD_POINTER);
@@ -316,7 +301,6 @@ static uint32_t fingerprint(void)
  * last, is another one. */
 static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
 {
-    (void)state;
     const size_t length = sizeof kapitza_circle_q31 / sizeof kapitza_circle_q31[0];
     for (size_t i = 0; i < length; i++) {
         COUNTS(turns[i]++);

@@ -1,12 +1,5 @@
 /* The spectrum of the noise of a kind's sums in fixed point, and the scatter of scores, against their definitions. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #include "number/scaled_q31.h"
 #include "weak/scores_q31.h"
@@ -36,7 +29,6 @@ static double variance_at(int h, double v, int of_error)
 
 static void the_spectrum_is_that_of_its_definition(void **state)
 {
-    (void)state;
     for (uint8_t kind = 0; kind < 2u; kind++) {
         pvid_weak_white_q31 self = {.powers = WEIGHTS};
         pvid_scaled_q31 weight[WEIGHTS];
@@ -67,7 +59,6 @@ static void the_spectrum_is_that_of_its_definition(void **state)
 /* Means of products of scores, a window with the weight 2/(k + 2) behind k windows; neighbours count both ways. */
 static void means_of_scores_are_those_of_their_windows(void **state)
 {
-    (void)state;
     enum { N_P = 2, PAIRS = 3, WINDOWS = 9 };
     static const int32_t score[WINDOWS][N_P] = {{700000, -400000},  {-300000, 900000}, {650000, 250000},
                                                 {-800000, 100000},  {500000, 500000},  {350000, -900000},

@@ -42,7 +42,6 @@ static pvid_reason judge_good(double variance_ratio)
 
 static void the_first_groups_are_never_published(void **state)
 {
-    (void)state;
     assert_int_equal(judge_good(1.0), PVID_HELD_UNCERTAIN);
     assert_int_equal(judge_good(1.0), PVID_HELD_UNCERTAIN);
     assert_false(trust.published);
@@ -54,7 +53,6 @@ static void the_first_groups_are_never_published(void **state)
 
 static void held_group_keeps_the_published_estimate_with_reason(void **state)
 {
-    (void)state;
     for (int i = 0; i < 3; i++) {
         (void)judge_good(1.0);
     }
@@ -79,7 +77,6 @@ static void held_group_keeps_the_published_estimate_with_reason(void **state)
 
 static void a_condition_at_its_limit_is_met(void **state)
 {
-    (void)state;
     for (int i = 0; i < 3; i++) {
         (void)judge_good(1.0);
     }
@@ -91,7 +88,6 @@ static void a_condition_at_its_limit_is_met(void **state)
 
 static void after_sixteen_refusals_p_goes_back(void **state)
 {
-    (void)state;
     for (int i = 0; i < 16; i++) {
         assert_null(fallback());
         (void)judge(PVID_HELD_NOT_EXCITED, 0.0, true, 1.0, candidate(1.0, 0.0));
@@ -103,7 +99,6 @@ static void after_sixteen_refusals_p_goes_back(void **state)
 
 static void a_step_ends_the_refusals(void **state)
 {
-    (void)state;
     for (int i = 0; i < 15; i++) {
         (void)judge(PVID_HELD_SINGULAR, 0.0, true, 1.0, candidate(1.0, 0.0));
     }
@@ -114,7 +109,6 @@ static void a_step_ends_the_refusals(void **state)
 
 static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
 {
-    (void)state;
     for (int i = 0; i < 3; i++) {
         (void)judge_good(1000.0); /* p is on its way: not counted */
     }
@@ -134,7 +128,6 @@ static void large_residuals_raise_the_alarm_and_small_ones_end_it(void **state)
 
 static void small_variance_ratio_raises_after_sixteen_groups(void **state)
 {
-    (void)state;
     for (int i = 0; i < 3 + 15; i++) {
         assert_true(judge_good(4.2) != PVID_MISFIT);
     }
@@ -148,7 +141,6 @@ static pvid_reason judge_fit(double misfit, int rows)
 
 static void rows_that_do_not_fit_raise_the_alarm_with_the_first_publication(void **state)
 {
-    (void)state;
     (void)judge_fit(20.0, 20);
     (void)judge_fit(20.0, 30);
     assert_int_equal(judge_fit(20.0, 40), PVID_MISFIT);
@@ -180,7 +172,6 @@ static void judge_moved(double by, double misfit)
 
 static void rows_of_a_poor_start_fade(void **state)
 {
-    (void)state;
     double left;
     judge_moved(1.15, 20.0); /* not far from the start */
     assert_int_equal(groups_of_fading(&left), 0);
@@ -197,7 +188,6 @@ static void rows_of_a_poor_start_fade(void **state)
 
 static void nothing_fades_before_convergence_or_with_large_errors(void **state)
 {
-    (void)state;
     double left;
     const an_estimate estimate = fitted(candidate(0.01, 1.0e-2), 20.0, 40);
     const an_estimate vague = fitted(candidate(0.2, 1.0e-2), 20.0, 40);
@@ -221,7 +211,6 @@ static void nothing_fades_before_convergence_or_with_large_errors(void **state)
 /* Residuals from while the past faded belong to an estimate that has gone. */
 static void the_alarms_means_restart_with_a_renewal(void **state)
 {
-    (void)state;
     double left;
     for (int i = 0; i < 3 + 20; i++) {
         (void)judge_good(100.0);
@@ -238,7 +227,6 @@ static void the_alarms_means_restart_with_a_renewal(void **state)
  * sums are trusted. */
 static void a_changed_mechanism_begins_the_sums_anew(void **state)
 {
-    (void)state;
     double left;
     for (int i = 0; i < 3 + 20; i++) {
         (void)judge_good(100.0);
@@ -257,7 +245,6 @@ static void a_changed_mechanism_begins_the_sums_anew(void **state)
 
 static void expected_residuals_raise_no_alarm(void **state)
 {
-    (void)state;
     for (int i = 0; i < 1000; i++) {
         assert_true(judge_good(((i % 3) == 0) ? 2.0 : 1.0) != PVID_MISFIT);
     }
@@ -265,7 +252,6 @@ static void expected_residuals_raise_no_alarm(void **state)
 
 static void the_alarm_can_be_switched_off(void **state)
 {
-    (void)state;
     trust.config.misfit_max = 0;
     for (int i = 0; i < 100; i++) {
         assert_true(judge_good(1.0e6) != PVID_MISFIT);
@@ -276,7 +262,6 @@ static void the_alarm_can_be_switched_off(void **state)
  * fourth 0.2^2 + 0.5^2. */
 static void shared_errors_join_what_is_published(void **state)
 {
-    (void)state;
     share(0.03, 0.5, -0.5);
     for (int i = 0; i < 4; i++) {
         (void)judge_good(1.0);
@@ -293,7 +278,6 @@ static void shared_errors_join_what_is_published(void **state)
  * estimate that is more than five of the other errors away contradicts. */
 static void shared_errors_neither_hold_nor_excuse(void **state)
 {
-    (void)state;
     share(1.0, 0.0, 1.0);
     for (int i = 0; i < 4; i++) {
         (void)judge_good(1.0);

@@ -33,7 +33,6 @@ static void point_at_own(void)
 
 static void what_either_core_refuses(void **state)
 {
-    (void)state;
     GIVES((void)0, PVID_OK);
     GIVES(design.model = NULL, PVID_BAD_MODEL);
     GIVES(model.samples = 0, PVID_BAD_MODEL);
