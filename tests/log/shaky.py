@@ -60,10 +60,7 @@ def send_frames(line: int, count: int) -> None:
 def throughput(count: int) -> Throughput:
     """Records `count` frames, sent as fast as they are taken, in a process of its own; see Throughput.
 
-    Raises
-    ------
-    PvidError
-        When the recording fails.
+    Raises PvidError when the recording fails.
     """
     ours, theirs = os.openpty()
     tty.setraw(theirs)

@@ -52,10 +52,7 @@ def option(name: str | list[str], default: Any, about: str = "", least: int = 1,
 def chosen(mechanism: Collection[str], usual: Sequence[str] = ()) -> tuple[str, ...]:
     """The mechanisms of a case; (): those that are usual for it, or all.
 
-    Raises
-    ------
-    PvidError
-        When there is none of a name.
+    Raises PvidError when there is none of a name.
     """
     from pvid.models.mechanisms import names
 

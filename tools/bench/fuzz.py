@@ -20,10 +20,8 @@ _COMPILER = ("clang", "-std=c99", "-g", "-O1", "-fno-sanitize-recover=all")
 def fuzz_link(folder: Path, runs: int, seed: int = 1) -> int:
     """Builds tests/fuzz/fuzz_link.c in `folder` and runs it `runs` times; returns how many runs it reports.
 
-    Raises
-    ------
-    PvidError
-        When clang is missing, it does not build, or an input breaks the codec; the input is kept in `folder`.
+    Raises PvidError when clang is missing, it does not build, or an input breaks the codec; the input is kept in
+    `folder`.
     """
     binary = folder / "fuzz_link"
     sources = [LINK / "link.c", source("crc32.c"), FUZZ / "fuzz_link.c"]
@@ -64,10 +62,7 @@ class ApiCalls:
 def fuzz_api(folder: Path, calls: int, seed: int = 1) -> ApiCalls:
     """Builds tests/fuzz/fuzz_api.c with the core in `folder` and lets it make so many calls.
 
-    Raises
-    ------
-    PvidError
-        When clang is missing, it does not build, a sanitizer reports something or what must hold does not.
+    Raises PvidError when clang is missing, it does not build, a sanitizer reports something or what must hold does not.
     """
     binary = folder / "fuzz_api"
     ignored = f"-fsanitize-ignorelist={ROOT / 'tests' / 'sanitizers.ignore'}"

@@ -525,10 +525,7 @@ def _truth_of(plant: Plant, acting: Sequence[tuple[Effect, float]]) -> tuple[Flo
 def outcome(plant: Plant, seed: int, *acting: tuple[Effect, float]) -> Outcome:
     """Identifies a recording with the plant's own model, as a user would.
 
-    Raises
-    ------
-    PvidError
-        When the recording is refused.
+    Raises PvidError when the recording is refused.
     """
     model = plant.model()
     run = Recording(np.arange(SAMPLES) / plant.rate, recording(plant, seed, *acting), plant.rate)

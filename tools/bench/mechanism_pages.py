@@ -184,13 +184,7 @@ def page(name: str, example: Example, errors: str) -> str:
 
 
 def printed_demo() -> str:
-    """What the demo prints.
-
-    Raises
-    ------
-    PvidError
-        When it fails.
-    """
+    """What the demo prints. Raises PvidError when it fails."""
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-P", "-m", "pvid", "demo"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)

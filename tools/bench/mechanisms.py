@@ -194,10 +194,8 @@ def identified(
 
     Parameters
     ----------
-    own_design
-        The rig's own design; else the one that the identification chooses on each run.
-    gain_sd
-        That the model declares of what is driven.
+    own_design : the rig's own design; else the one that the identification chooses on each run
+    gain_sd : that the model declares of what is driven
     """
     outcome = Outcome(simulation_of(name))
     simulation = outcome.simulation

@@ -49,10 +49,7 @@ def expected(name: str, core: Core) -> npt.NDArray[np.uint32]:
 def played(board: Board, name: str, core: Core) -> tuple[ReplayReport, npt.NDArray[np.uint32]]:
     """A mechanism's shipped rig on a board, and the hashes of the twin.
 
-    Raises
-    ------
-    PvidError
-        Where it does not fit, or the board's float32 is another one.
+    Raises PvidError where it does not fit, or the board's float32 is another one.
     """
     if core == "f32":
         image, _ = build_mechanism_image(board, mechanism_run(name))
@@ -72,10 +69,7 @@ def reason_for_no_figure(error: PvidError) -> str:
 def row_of(board: Board, core: Core, names: tuple[str, ...] = KINDS) -> tuple[str, ...]:
     """Mean instructions of a tick (an AVR: clock cycles) of each mechanism, and whether all bits are the twin's.
 
-    Raises
-    ------
-    PvidError
-        Where an image fails.
+    Raises PvidError where an image fails.
     """
     cells, equal = [], "-"
     for name in names:

@@ -25,16 +25,12 @@ def appearing(path: Path, *, freely: bool = False) -> Iterator[Path]:
 
     A device or a pipe is written to, since it cannot be replaced.
 
+    Raises OSError when `path` is a folder, or nothing can be moved there. Raises PvidError when it is a file that pvid
+    did not write, or a link: see pvid.base.replacing.
+
     Parameters
     ----------
     freely : whether any file is replaced: one of a cache, or one that is changed between its markers
-
-    Raises
-    ------
-    OSError
-        When `path` is a folder, or nothing can be moved there.
-    PvidError
-        When it is a file that pvid did not write, or a link: see pvid.base.replacing.
     """
     kind = _kind(path)
     if stat.S_ISDIR(kind):
@@ -60,12 +56,7 @@ def appearing(path: Path, *, freely: bool = False) -> Iterator[Path]:
 def write_whole(path: Path, content: str | bytes, *, freely: bool = False) -> None:
     """Writes a file, text in UTF-8, whole or not at all; one that has this content already stays.
 
-    Raises
-    ------
-    OSError
-        When it cannot be written.
-    PvidError
-        As `appearing`.
+    Raises OSError when it cannot be written. Raises PvidError as `appearing`.
     """
     data = in_utf8(content).encode() if isinstance(content, str) else content
     if _has(path, data):
@@ -80,10 +71,7 @@ def write_whole(path: Path, content: str | bytes, *, freely: bool = False) -> No
 def write_files(folder: Path, files: Mapping[str, str]) -> list[Path]:
     """Writes files of a folder, by their names in it, or none of them where one must not be replaced.
 
-    Raises
-    ------
-    OSError, PvidError
-        As write_whole.
+    Raises OSError, PvidError as write_whole.
     """
     paths = [folder / name for name in files]
     for path, text in zip(paths, files.values(), strict=True):

@@ -22,15 +22,12 @@ Done = TypeVar("Done")
 def each(client: Any, work: Callable[..., Done], items: Sequence[Item], **fixed: Any) -> Iterator[Done]:
     """The results of work(item, **fixed), as they come.
 
+    Raises PvidError: that of the work, or where a worker cannot run it.
+
     Parameters
     ----------
     client : of `client`; None: this process does the work
     work : a function that a worker can import
-
-    Raises
-    ------
-    PvidError
-        That of the work, or where a worker cannot run it.
     """
     if client is None:
         yield from (work(item, **fixed) for item in items)
@@ -52,15 +49,12 @@ def client(scheduler: str | None, workers: int) -> Iterator[Any]:
     """A client of the scheduler, or of worker processes of its own that nobody else can reach; None for one worker on
     this machine, for which another process and a scheduler take longer to start than most recordings to identify.
 
+    Raises PvidError when the scheduler cannot be reached or has no worker, or dask.distributed is not installed.
+
     Parameters
     ----------
     scheduler : address of a running scheduler; None: processes on this machine
     workers : number of these processes
-
-    Raises
-    ------
-    PvidError
-        When the scheduler cannot be reached or has no worker, or dask.distributed is not installed.
     """
     if scheduler is None and workers == 1:
         yield None

@@ -17,13 +17,7 @@ FORMATS = ("png", "svg", "pdf")
 
 
 def format_of(path: Path) -> str:
-    """The format by the suffix of a figure's name; png without suffix.
-
-    Raises
-    ------
-    PvidError
-        When it is another one.
-    """
+    """The format by the suffix of a figure's name; png without suffix. Raises PvidError when it is another one."""
     found = path.suffix[1:].lower() or FORMATS[0]
     if found not in FORMATS:
         raise PvidError(f"the figure {path} has no name of one: it must end in .{', .'.join(FORMATS)}")
@@ -31,13 +25,7 @@ def format_of(path: Path) -> str:
 
 
 def save(figure: Figure, path: Path, dpi: int) -> None:
-    """Writes a figure, whole or not at all.
-
-    Raises
-    ------
-    PvidError
-        When it cannot be written.
-    """
+    """Writes a figure, whole or not at all. Raises PvidError when it cannot be written."""
     kind = format_of(path)
     key = "Software" if kind == "png" else "Creator"
     try:

@@ -19,10 +19,7 @@ def lock(descriptor: int, path: Path) -> None:
 
     Where the system or the file system has no such locks (Windows, some network folders), nothing is locked.
 
-    Raises
-    ------
-    PvidError
-        When another process writes the file.
+    Raises PvidError when another process writes the file.
     """
     if fcntl is None:
         return

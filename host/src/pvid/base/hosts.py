@@ -14,15 +14,11 @@ Address = tuple[socket.AddressFamily, Any]
 def addresses(host: str, port: int, kind: socket.SocketKind, otherwise: str) -> list[Address]:
     """Family and address of a host by its name.
 
+    Raises PvidError when the name is invalid or cannot be resolved.
+
     Parameters
     ----------
-    otherwise
-        How the sentence begins where there is none.
-
-    Raises
-    ------
-    PvidError
-        When the name is invalid or cannot be resolved.
+    otherwise : how the sentence begins where there is none
     """
     try:
         return [(family, address) for family, _, _, _, address in socket.getaddrinfo(host, port, type=kind)]

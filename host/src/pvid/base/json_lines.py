@@ -26,13 +26,7 @@ def read_json_lines(path: Path) -> list[dict[str, Any]]:
 
 
 def append_json_line(path: Path, one: Mapping[str, Any]) -> None:
-    """Appends an object, behind what an interruption has left of a line.
-
-    Raises
-    ------
-    PvidError
-        When it cannot be written.
-    """
+    """Appends an object, behind what an interruption has left of a line. Raises PvidError when it cannot be written."""
     try:
         with path.open("ab") as file:
             if file.tell() > 0 and not _ends_a_line(path):

@@ -21,10 +21,7 @@ _MOST_PARTS = 4  # of a key, as sensor.phi.resolution
 def key_and_value(setting: str, example: str) -> tuple[str, Any]:
     """`l1=0.25` as a key and its value, which is written as in TOML; the quotes of a word may be left out.
 
-    Raises
-    ------
-    PvidError
-        When it is none; the sentence contains the example.
+    Raises PvidError when it is none; the sentence contains the example.
     """
     key, equals, text = (part.strip() for part in setting.partition("="))
     if not equals or not key or not text:
@@ -53,10 +50,7 @@ def copied(tables: Mapping[str, Any]) -> dict[str, Any]:
 def put(tables: dict[str, Any], key: str, value: Any) -> None:
     """Sets a dotted key, as sensor.phi.resolution, in tables that are made where they are missing.
 
-    Raises
-    ------
-    NotATableError
-        Where one of them is none.
+    Raises NotATableError where one of them is none.
     """
     *parts, name = key.split(".")
     place = tables
@@ -75,10 +69,7 @@ def quoted(text: str) -> str:
 def toml_document(text: str) -> dict[str, Any]:
     """The tables in a text.
 
-    Raises
-    ------
-    PvidError
-        When it is not TOML, or too long or too deep for a file that a person wrote.
+    Raises PvidError when it is not TOML, or too long or too deep for a file that a person wrote.
     """
     if len(text) > MOST_BYTES:
         raise PvidError(TOO_LONG)

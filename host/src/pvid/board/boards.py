@@ -113,13 +113,7 @@ BOARDS = {
 
 
 def board(name: str) -> Board:
-    """The board of that name.
-
-    Raises
-    ------
-    PvidError
-        When there is none.
-    """
+    """The board of that name. Raises PvidError when there is none."""
     if name not in BOARDS:
         raise PvidError(f"there is no board {name}; there are {', '.join(BOARDS)}")
     return BOARDS[name]
@@ -128,15 +122,11 @@ def board(name: str) -> Board:
 def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = ROOT / "firmware") -> Path:
     """Builds firmware/ for a board into `tree` with these CMake variables; returns `tree`.
 
+    Raises PvidError when the compiler is missing or something does not build.
+
     Parameters
     ----------
-    source
-        Another CMake project, which contains it.
-
-    Raises
-    ------
-    PvidError
-        When the compiler is missing or something does not build.
+    source : another CMake project, which contains it
     """
     if shutil.which(target.compiler) is None:
         raise PvidError(f"{target.compiler} is not installed: it comes with ./tools/test")
@@ -184,13 +174,7 @@ def keep_header(folder: Path, name: str, text: str) -> None:
 
 
 def prepare_emulator(target: Board) -> None:
-    """Makes sure that `target.command` can be run.
-
-    Raises
-    ------
-    PvidError
-        When the emulator is not installed.
-    """
+    """Makes sure that `target.command` can be run. Raises PvidError when the emulator is not installed."""
     if shutil.which(target.emulator) is None:
         raise PvidError(f"{target.emulator} is not installed: it comes with ./tools/test")
     if target.emulator == "simavr":
@@ -227,17 +211,12 @@ class Outcome:
 def run(target: Board, image: Path, timeout: float, machine: str | None = None, input_bytes: bytes = b"") -> Outcome:
     """Runs an image in its board's emulator until it exits, `timeout` seconds at most.
 
+    Raises PvidError when the emulator is missing or the image does not exit in time.
+
     Parameters
     ----------
-    input_bytes
-        What the image receives over its UART, from when it has sent something.
-    machine
-        Another machine of the same emulator.
-
-    Raises
-    ------
-    PvidError
-        When the emulator is missing or the image does not exit in time.
+    input_bytes : what the image receives over its UART, from when it has sent something
+    machine : another machine of the same emulator
     """
     prepare_emulator(target)
     command = [machine if machine and part == target.machine else part for part in target.command(image)]

@@ -141,10 +141,7 @@ class CostedDesign:
     def of_recording(cls, asked: Asked, compiled: CompiledModel, recording: Recording) -> CostedDesign:
         """That which `model build --run` prints.
 
-        Raises
-        ------
-        PvidError
-            Where the identifier does not have what the model needs.
+        Raises PvidError where the identifier does not have what the model needs.
         """
         run = recording.signals
         if asked.core != FLOAT.name:
@@ -183,10 +180,7 @@ class CostedDesign:
     def cost(self, asked: Asked, refine: RefineConfig | None) -> Cost:
         """Builds an image, replays the run on the board and on this machine.
 
-        Raises
-        ------
-        PvidError
-            When a compiler or the emulator is missing, or the image does not fit or fails.
+        Raises PvidError when a compiler or the emulator is missing, or the image does not fit or fails.
         """
         if isinstance(self.weak, WeakQ31):
             return _in_fixed_point(asked, self.weak, self.run)

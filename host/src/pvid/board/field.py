@@ -86,10 +86,7 @@ class FieldRecord:
     def samples(self, begin: int, end: int) -> tuple[Samples, ...]:
         """Each sample of ticks begin..end - 1 [end - begin], in the order in which the identifier takes them.
 
-        Raises
-        ------
-        PvidError
-            When one of them is missing.
+        Raises PvidError when one of them is missing.
         """
         missing = [gap for gap in self.gaps if gap[0] < end and gap[1] > begin]
         if missing or begin < self.first or end > self.ticks:
@@ -134,18 +131,13 @@ def collect(
 ) -> FieldRecord:
     """Collects the frames of a board in field mode, for `ticks` samples from the first that arrives.
 
+    Raises PvidError when the board refuses, sends nothing for `patience_s`, or the port is gone.
+
     Parameters
     ----------
-    begin
-        Starts the board over, with these settings and `source`, `hash_every`, `estimate_every` [ticks]; None: joins
-        the session that goes on.
-    patience_s
-        Longest silence [s].
-
-    Raises
-    ------
-    PvidError
-        When the board refuses, sends nothing for `patience_s`, or the port is gone.
+    begin : starts the board over, with these settings and `source`, `hash_every`, `estimate_every` [ticks]; None: joins
+        the session that goes on
+    patience_s : longest silence [s]
     """
     record = FieldRecord()
     decoder = Decoder(record.received)

@@ -29,8 +29,7 @@ class FloatBoard:
     rig : of the mechanism
     compiled : the model with the values of the rig
     config : settings and tables of the identifier
-    recording
-        what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
+    recording : what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
     """
 
     configure_frame: ClassVar[type[Configure]] = Configure
@@ -88,10 +87,7 @@ class FloatBoard:
     def configured(self, frame: Configuration) -> Any:
         """The settings with the values of a Configure frame.
 
-        Raises
-        ------
-        PvidError
-            For one of the other core, or a law that there is not.
+        Raises PvidError for one of the other core, or a law that there is not.
         """
         if not isinstance(frame, self.configure_frame):
             raise PvidError("the board's image contains another core than the log's settings")

@@ -88,16 +88,14 @@ class MechanismBoard(FloatBoard):
     ) -> MechanismBoard:
         """With the design and the tables that a recording of the rig asks for; the board's sensors read it.
 
+        Raises PvidError when the recording is too short, or the identifier or its second stage does not have what the
+        model needs.
+
         Parameters
         ----------
         to_identify : as `identify` does: what is published is judged on this machine
         ranking : as of pvid.configuration.weak.design_for_recording
         refined : with the second stage
-
-        Raises
-        ------
-        PvidError
-            When the recording is too short, or the identifier or its second stage does not have what the model needs.
         """
         recording.refuse_damaged()
         whole = recording.whole()
@@ -110,15 +108,12 @@ class MechanismBoard(FloatBoard):
     def of_shipped_rig(cls, name: str, refined: bool = False) -> MechanismBoard:
         """That of a shipped mechanism, whose sensors read a simulation.
 
+        Raises PvidError where there is no such mechanism, or the identifier or its second stage does not have what it
+        needs.
+
         Parameters
         ----------
-        refined
-            With the second stage; the simulation is then one of the equations of the refinement.
-
-        Raises
-        ------
-        PvidError
-            Where there is no such mechanism, or the identifier or its second stage does not have what it needs.
+        refined : with the second stage; the simulation is then one of the equations of the refinement
         """
         simulated = simulated_rig(name)
         rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
@@ -134,16 +129,13 @@ class MechanismBoard(FloatBoard):
     def of_guess(cls, rig: MechanismRig, refined: bool = False) -> MechanismBoard:
         """With a design for the guess of a rig; the sensors of an emulated board read a simulation of it.
 
+        Raises PvidError where there is no such simulation (see `nominal_run`), or the identifier does not have what the
+        model needs.
+
         Parameters
         ----------
-        refined
-            With the second stage. The simulation follows the equations of the weak form: where those of the refinement
-            are others, they contradict it.
-
-        Raises
-        ------
-        PvidError
-            Where there is no such simulation (see `nominal_run`), or the identifier does not have what the model needs.
+        refined : with the second stage. The simulation follows the equations of the weak form: where those of the
+            refinement are others, they contradict it.
         """
         made = nominal_run(rig)
         run = made.recording.signals
@@ -246,10 +238,7 @@ class MechanismBoard(FloatBoard):
     def of_tables(cls, rig: MechanismRig, settings: Mapping[str, Any]) -> MechanismBoard:
         """From the rig and the table of settings in the text of a log.
 
-        Raises
-        ------
-        KeyError, TypeError, ValueError, IndexError
-            Where it is damaged.
+        Raises KeyError, TypeError, ValueError, IndexError where it is damaged.
         """
         compiled = rig.compiled()
         config = _config(compiled, settings)
@@ -286,14 +275,11 @@ BOARDS = dict(zip(CORES, _KINDS, strict=True))
 def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismBoardQ31 | StrongBoard | None:
     """From the text of a log; None: that of another kind of rig.
 
+    Raises PvidError where it breaks off, or names a mechanism that is not shipped and not that of this call.
+
     Parameters
     ----------
     model : name or model file of this call; a log of one's own mechanism needs it
-
-    Raises
-    ------
-    PvidError
-        Where it breaks off, or names a mechanism that is not shipped and not that of this call.
     """
     document = toml_document(text)
     settings = document.pop(TABLE, None)

@@ -187,13 +187,7 @@ class MechanismBoardQ31:
         )
 
     def configured(self, frame: Configuration) -> WeakConfigQ31:
-        """The settings with the values of a Configure frame.
-
-        Raises
-        ------
-        PvidError
-            For one of the other core.
-        """
+        """The settings with the values of a Configure frame. Raises PvidError for one of the other core."""
         if not isinstance(frame, self.configure_frame):
             raise PvidError("the board's image contains another core than the log's settings")
         own = self.config.estimator
@@ -221,10 +215,7 @@ class MechanismBoardQ31:
     def of_tables(cls, rig: MechanismRig, weak: Mapping[str, Any]) -> MechanismBoardQ31:
         """From the rig and the table of settings in the text of a log.
 
-        Raises
-        ------
-        KeyError, TypeError, ValueError, IndexError
-            Where it is damaged.
+        Raises KeyError, TypeError, ValueError, IndexError where it is damaged.
         """
         for value in weak.values():
             _refuse_words(value)

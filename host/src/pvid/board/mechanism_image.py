@@ -107,10 +107,7 @@ def measured_from(first: int, period: int, ticks: int) -> int:
 def mechanism_run(name: str, ticks: int | None = None, *, long: bool = False) -> MechanismRun:
     """The shipped rig of a mechanism; `ticks`: by default the first window and PERIODS half windows, or a `long_run`.
 
-    Raises
-    ------
-    PvidError
-        Where there is no such mechanism, or its rig's run is shorter.
+    Raises PvidError where there is no such mechanism, or its rig's run is shorter.
     """
     compiled = mechanisms.compiled_of(name)
     config = config_for_simulated_rig(compiled)

@@ -65,10 +65,7 @@ class FixedRun:
 def fixed_run(name: str, ticks: int | None = None, *, long: bool = False) -> FixedRun:
     """The shipped rig of a mechanism; `ticks` and `long` as in mechanism_run.
 
-    Raises
-    ------
-    PvidError
-        Where there is no such mechanism, or its rig's run is shorter.
+    Raises PvidError where there is no such mechanism, or its rig's run is shorter.
     """
     compiled = mechanisms.compiled_of(name)
     weak = weak_q31_for_simulated_rig(compiled)

@@ -86,10 +86,8 @@ def _named(symbols: list[_Symbol], name: str) -> _Symbol:
 def profile(board: Board, form: Form, core: Core = "f32", model: str = STANDARD) -> Profile:
     """Plays the replay image of the standard run, or in the weak form that of a shipped mechanism, and counts.
 
-    Raises
-    ------
-    PvidError
-        When the board's emulator is not QEMU or takes no plugins, something does not build, or the image fails.
+    Raises PvidError when the board's emulator is not QEMU or takes no plugins, something does not build, or the image
+    fails.
     """
     if board.toolchain == "avr":
         raise PvidError(f"{board.name}: only QEMU counts by function")
@@ -99,10 +97,7 @@ def profile(board: Board, form: Form, core: Core = "f32", model: str = STANDARD)
 def refined(board: Board) -> Profile:
     """Of both stages of the standard mechanism, the ticks behind the first estimate of the second one.
 
-    Raises
-    ------
-    PvidError
-        As `profile`.
+    Raises PvidError as `profile`.
     """
     run = refined_replay(board)
     return _counted(board, build_refined_image(board, run)[0], "pvid_weak_step_f32", run.weak.measure_from)

@@ -76,15 +76,12 @@ def published_run(
     """The shipped rig of a mechanism with the equations of its refinement; the ticks of the steady state count in the
     mean, as in mechanism_run, behind the first window in which a refined estimate is published.
 
+    Raises PvidError where it is not published within `ticks`.
+
     Parameters
     ----------
     options : of the refinement; Runge-Kutta's steps have their usual jobs, with fewer they are too late
     motion : another one of the rig: name of each signal -> samples
-
-    Raises
-    ------
-    PvidError
-        Where it is not published within `ticks`.
     """
     run = refined_run(name, ticks, options)
     if not run.made.runge_kutta:

@@ -50,10 +50,7 @@ class ReplayReport:
 def parse_report(text: str) -> ReplayReport:
     """Reads what the image printed.
 
-    Raises
-    ------
-    PvidError
-        When the image faulted or did not come to its end; the sentence has its own words.
+    Raises PvidError when the image faulted or did not come to its end; the sentence has its own words.
     """
     fault = re.search(r"pvid fault: .*", text)
     if fault:
@@ -82,11 +79,8 @@ def parse_report(text: str) -> ReplayReport:
 def play(target: Board, image: Path, timeout: float) -> ReplayReport:
     """Runs a replay image in its board's emulator and reads its report; `timeout` [s] as in `board.boards.run`.
 
-    Raises
-    ------
-    PvidError
-        When the image fails; of a stack that grows into the variables, which nothing on an AVR detects, a sentence of
-        its own.
+    Raises PvidError when the image fails; of a stack that grows into the variables, which nothing on an AVR detects, a
+    sentence of its own.
     """
     outcome = run_image(target, image, timeout)
     full = f"{target.name}: the image does not fit: its stack exceeds the RAM"

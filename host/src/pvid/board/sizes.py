@@ -119,10 +119,7 @@ CODE = r"\.text|\.s?rodata"  # sections
 def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     """Builds and runs the replay image of a configuration.
 
-    Raises
-    ------
-    PvidError
-        When a compiler or emulator is missing, or the image fails.
+    Raises PvidError when a compiler or emulator is missing, or the image fails.
     """
     return measured(configuration.board, _BUILT[configuration.form](configuration))
 
@@ -186,13 +183,7 @@ _BUILT: dict[str, Callable[[Configuration], BuiltImage]] = {
 
 
 def measured(board: Board, built: BuiltImage) -> tuple[Footprint, ReplayReport]:
-    """Runs an image and counts what is in it.
-
-    Raises
-    ------
-    PvidError
-        When the emulator is missing, or the image fails.
-    """
+    """Runs an image and counts what is in it. Raises PvidError when the emulator is missing, or the image fails."""
     map_text = built.image.with_suffix(".map").read_text(encoding="utf-8")
     report = play(board, built.image, TIMEOUT_S)
     footprint = Footprint(
@@ -306,13 +297,7 @@ def budget_text(footprints: dict[Configuration, Footprint]) -> str:
 
 
 def write_budget(path: Path, footprints: dict[Configuration, Footprint]) -> None:
-    """Replaces the budget between its marks in `path`.
-
-    Raises
-    ------
-    PvidError
-        When the file has no place for it.
-    """
+    """Replaces the budget between its marks in `path`. Raises PvidError when the file has no place for it."""
     old = path.read_text(encoding="utf-8")
     if OPENING not in old or CLOSING not in old:
         raise PvidError(f"{path} does not contain the marker lines of the budget, {OPENING} and {CLOSING}")

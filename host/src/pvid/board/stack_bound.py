@@ -152,20 +152,14 @@ def _addresses(pointed: set[tuple[str, str]], placed: dict[tuple[str, str], int]
 def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
     """Bytes of stack that `entry` and all it can call need at most.
 
+    Raises PvidError when a frame's size is unknown or a function can call itself.
+
     Parameters
     ----------
-    tool_prefix
-        What stands before objdump.
-    entry
-        Where the stack is still empty.
-    image, tree
-        The linked image, with its map beside it, and the build tree with the compiler's records (*.su), libpvid.a and
-        the image's objects.
-
-    Raises
-    ------
-    PvidError
-        When a frame's size is unknown or a function can call itself.
+    tool_prefix : what stands before objdump
+    entry : where the stack is still empty
+    image, tree : the linked image, with its map beside it, and the build tree with the compiler's records (*.su),
+        libpvid.a and the image's objects
     """
     functions = _functions(_output(f"{tool_prefix}objdump", "-d", str(image)))
     compiled_in = [tree / "libpvid.a", *sorted((tree / "apps").rglob("*.o*"))]  # a model is beside the image's own

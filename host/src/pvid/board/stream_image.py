@@ -149,10 +149,7 @@ def _guarded(guard: str, lines: list[str]) -> str:
 def build_image(rig: Streamed, board: Board | None) -> Path:
     """Builds the stream image for a board, or for this machine (None), under build/targets; returns it.
 
-    Raises
-    ------
-    PvidError
-        When a compiler is missing or something does not build.
+    Raises PvidError when a compiler is missing or something does not build.
     """
     image = rig.stream_image
     files = image.headers

@@ -52,10 +52,8 @@ class StrongBoard(FloatBoard):
     def of_recording(cls, rig: MechanismRig, recording: Recording) -> StrongBoard:
         """With the window and settings that a recording of the rig asks for; the board's sensors read it.
 
-        Raises
-        ------
-        PvidError
-            When the recording is too short, or the strong form of the model needs what the core does not have.
+        Raises PvidError when the recording is too short, or the strong form of the model needs what the core does not
+        have.
         """
         recording.refuse_damaged()
         whole = recording.whole()
@@ -75,10 +73,7 @@ class StrongBoard(FloatBoard):
     def of_guess(cls, rig: MechanismRig) -> StrongBoard:
         """With a design for the guess of a rig; an emulated board's sensors read a simulation of it.
 
-        Raises
-        ------
-        PvidError
-            Where there is no such simulation (see `nominal_run`), and as `of_recording`.
+        Raises PvidError where there is no such simulation (see `nominal_run`), and as `of_recording`.
         """
         return cls.of_recording(rig, nominal_run(rig).recording)
 
@@ -143,10 +138,7 @@ class StrongBoard(FloatBoard):
     def of_tables(cls, rig: MechanismRig, settings: Mapping[str, Any]) -> StrongBoard:
         """From the rig and the table of settings in the text of a log.
 
-        Raises
-        ------
-        KeyError, TypeError, ValueError
-            Where it is damaged.
+        Raises KeyError, TypeError, ValueError where it is damaged.
         """
         compiled = rig.compiled()
         strong = renamed(strong_functions_of(strong_form(compiled)))

@@ -115,10 +115,7 @@ def header(design: StrongDesign | StrongDesignQ31) -> str:
 def play_on_board(target: str, run: StrongComparison) -> ReplayReport:
     """Builds the image of a recording for an emulated board and runs it.
 
-    Raises
-    ------
-    PvidError
-        When there is no such board, or it does not build or run.
+    Raises PvidError when there is no such board, or it does not build or run.
     """
     board = _board(target, run.core)
     ticks = run.found.ticks
@@ -153,10 +150,7 @@ def build_image(board: Board, design: StrongDesign | StrongDesignQ31) -> tuple[P
 def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:
     """Runs a recording on an emulated board and compares every hash that it reports.
 
-    Raises
-    ------
-    PvidError
-        As play_on_board.
+    Raises PvidError as play_on_board.
     """
     report = play_on_board(target, run)
     apart = report.differs_at(run.hashes)

@@ -95,15 +95,11 @@ class Target:
 def open_target(name: str, rig: Streamed, wrap: Callable[[Port], Port] = lambda port: port) -> Target:
     """Starts the emulator of that name with the image for `rig`, or opens a port.
 
+    Raises PvidError when there is no such target, or something that it needs is missing.
+
     Parameters
     ----------
-    wrap
-        What stands between the port and the player: a fault injector in the tests.
-
-    Raises
-    ------
-    PvidError
-        When there is no such target, or something that it needs is missing.
+    wrap : what stands between the port and the player: a fault injector in the tests
     """
     if name == HOST_TARGET:
         return _start_host(str(build_image(rig, None)), wrap)
@@ -432,25 +428,16 @@ def play(
 ) -> Playback:
     """Plays a run through a target and returns the account; it ends in bounded time, complete or not.
 
+    Raises PvidError when the target refuses the configuration.
+
     Parameters
     ----------
-    signals
-        Of every sensor [ticks], in its unit; in counts for the fixed-point core.
-    hash_every, estimate_every
-        Ticks between checkpoints of the running hash and between estimates; 0: the last only.
-    patience_s
-        Longest time without any progress [s].
-    resend_s
-        Time without an answer after which requests and samples are sent again [s].
-    reopen
-        Starts the target anew when it has gone; the run then starts over. None: the play ends.
-    reconnects
-        How often at most.
-
-    Raises
-    ------
-    PvidError
-        When the target refuses the configuration.
+    signals : of every sensor [ticks], in its unit; in counts for the fixed-point core
+    hash_every, estimate_every : ticks between checkpoints of the running hash and between estimates; 0: the last only
+    patience_s : longest time without any progress [s]
+    resend_s : time without an answer after which requests and samples are sent again [s]
+    reopen : starts the target anew when it has gone; the run then starts over. None: the play ends.
+    reconnects : how often at most
     """
     player = Player(target, rig, signals, hash_every, estimate_every, reopen, progress)
     try:
@@ -499,10 +486,7 @@ def judge(playback: Playback, expected: npt.NDArray[np.uint32]) -> Verdict:
 def targets_of(names: tuple[str, ...]) -> list[str]:
     """The targets of `--on`; "all": this machine and every emulator that is installed with its compiler.
 
-    Raises
-    ------
-    PvidError
-        For "all", when no emulator is installed.
+    Raises PvidError for "all", when no emulator is installed.
     """
     if "all" not in names:
         return list(names)
@@ -521,10 +505,7 @@ def verify(
 ) -> Verdict:
     """Plays a run on a target, an emulator being started again should it die, and judges it by the host's core.
 
-    Raises
-    ------
-    PvidError
-        When the target cannot be started or refuses the configuration.
+    Raises PvidError when the target cannot be started or refuses the configuration.
     """
     expected = rig.hashes(native, *signals)
     reopen = (lambda: open_target(name, rig)) if name in (HOST_TARGET, *EMULATORS) else None

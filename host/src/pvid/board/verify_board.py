@@ -29,15 +29,12 @@ def verify_recording(
 ) -> Verdict:
     """Plays it on a target, with the settings of `identify`; every hash is compared.
 
+    Raises PvidError when the target cannot be started or refuses, or the identifier does not have what the model needs.
+
     Parameters
     ----------
     ranking : of the analysis of the recording, where there is one: the design is not searched for again
     refined : with the second stage, in float32
-
-    Raises
-    ------
-    PvidError
-        When the target cannot be started or refuses, or the identifier does not have what the model needs.
     """
     if refined:
         refuse_unrefined(core)

@@ -30,13 +30,7 @@ class WeakImage:
 
 
 def weak_image(board: Board, model: str, core: Core) -> WeakImage:
-    """Builds it for a board.
-
-    Raises
-    ------
-    PvidError
-        Where there is no such mechanism, or it does not build.
-    """
+    """Builds it for a board. Raises PvidError where there is no such mechanism, or it does not build."""
     return _IMAGES[core](board, model)
 
 

@@ -150,10 +150,7 @@ class _Job:
     def of(cls, given: Mapping[str, Any], words: str, refresh: int = 0) -> _Job:
         """From the options.
 
-        Raises
-        ------
-        PvidError
-            Where they do not go together, or a file of somebody else would be replaced.
+        Raises PvidError where they do not go together, or a file of somebody else would be replaced.
         """
         from pvid.fleet.row import Question
 

@@ -333,10 +333,7 @@ def _refined_in_c(core: CoreAnswer, pictures: Pictures, *, as_json: bool, on: st
     """Refines an answer of the first stage by both stages in C and prints the refined estimate, or that of the first
     stage.
 
-    Raises
-    ------
-    PvidError
-        Where the mechanism, or its rig, has no second stage in C; nothing is printed.
+    Raises PvidError where the mechanism, or its rig, has no second stage in C; nothing is printed.
     """
     from pvid.identification.core_refined import refined_in_c
 

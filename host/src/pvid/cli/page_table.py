@@ -20,10 +20,7 @@ def table_in(page: Path, marker: str) -> str | None:
 def with_table(page: Path, marker: str, text: str) -> str:
     """The page with this text between <!-- marker --> and <!-- /marker -->.
 
-    Raises
-    ------
-    PvidError
-        When the page has no such lines.
+    Raises PvidError when the page has no such lines.
     """
     old = page.read_text(encoding="utf-8")
     opening, closing = f"<!-- {marker} -->", f"<!-- /{marker} -->"

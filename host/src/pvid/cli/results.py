@@ -49,10 +49,7 @@ class Results:
 def read_results(path: Path) -> Results:
     """A table that `put_results` wrote.
 
-    Raises
-    ------
-    PvidError
-        When a row has another number of cells than the header, or the file has no header.
+    Raises PvidError when a row has another number of cells than the header, or the file has no header.
     """
     lines = path.read_text(encoding="utf-8").splitlines()
     comments = [line for line in lines if line.startswith("# ")]

@@ -39,13 +39,7 @@ def analysis_of(compiled: CompiledModel, recording: Recording) -> Analysis:
 
 
 def recorded(compiled: CompiledModel, rig: MechanismRig | None, run_path: Path, columns: str | None) -> Recording:
-    """All of a recording in the units of the model.
-
-    Raises
-    ------
-    PvidError
-        Where it cannot be read or is damaged.
-    """
+    """All of a recording in the units of the model. Raises PvidError where it cannot be read or is damaged."""
     from pvid.rig.columns import parsed
     from pvid.rig.mechanism_file import channels_of
     from pvid.rig.run import read_recording

@@ -160,13 +160,7 @@ def _name_beside(out: Path, model: str) -> str:
 
 
 def numbers(given: tuple[str, ...], option: str, example: str = "--reach phi_1=40") -> dict[str, float]:
-    """NAME=VALUE, several times.
-
-    Raises
-    ------
-    PvidError
-        Where one is not of this kind.
-    """
+    """NAME=VALUE, several times. Raises PvidError where one is not of this kind."""
     found = {}
     for one in given:
         name, _, value = one.partition("=")

@@ -42,10 +42,8 @@ PRINTERS = (
 def files_of(model: GeneratedModel) -> dict[str, str]:
     """Name -> text of each file.
 
-    Raises
-    ------
-    PvidError
-        Where a function cannot be generated; for a soft sign that is in no channel, a reach that is of no input.
+    Raises PvidError where a function cannot be generated; for a soft sign that is in no channel, a reach that is of no
+    input.
     """
     return {name: text for printed in PRINTERS for name, text in printed(model).items()}
 
@@ -60,10 +58,7 @@ def build(model: GeneratedModel, directory: Path) -> list[Path]:
 def check(model: GeneratedModel, directory: Path) -> None:
     """Whether the files in a folder are those of the model.
 
-    Raises
-    ------
-    PvidError
-        For the first file that is missing or differs.
+    Raises PvidError for the first file that is missing or differs.
     """
     for name, text in files_of(model).items():
         path = directory / name

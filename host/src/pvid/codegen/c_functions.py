@@ -101,10 +101,7 @@ def temporary_prefix(names: Iterable[str]) -> str:
 def float32_of(value: Fraction) -> np.float32:
     """The nearest float32, rounded once.
 
-    Raises
-    ------
-    PvidError
-        Where it is beyond the range of float32, or rounds to 0 and is not 0.
+    Raises PvidError where it is beyond the range of float32, or rounds to 0 and is not 0.
     """
     try:
         near = np.float32(float(value))
@@ -220,13 +217,7 @@ def scaled_literal(value: Fraction) -> tuple[int, int]:
 
 
 def require_scaled(program: Program, where: str) -> None:
-    """Refuses what numbers of any size have no operation for.
-
-    Raises
-    ------
-    PvidError
-        For a square root and a soft sign.
-    """
+    """Refuses what numbers of any size have no operation for. Raises PvidError for a square root and a soft sign."""
     missing = sorted(program.kinds - set(_SCALED))
     if missing:
         words = {"sqrt": "a square root", "soft_sign": "a soft sign"}

@@ -34,10 +34,7 @@ class Reaches:
 def reaches_of(functions: ModelFunctions, given: Reaches) -> list[float]:
     """Largest absolute value of each input of channels.
 
-    Raises
-    ------
-    PvidError
-        For a name that is no input, or a reach that is not positive.
+    Raises PvidError for a name that is no input, or a reach that is not positive.
     """
     names = [one.name for one in functions.inputs]
     for name, reach in given.of.items():
@@ -105,10 +102,8 @@ class FixedModel:
 def fixed_model(functions: ModelFunctions, given: Reaches | None = None) -> FixedModel:
     """Formats of all functions from the reaches of the inputs.
 
-    Raises
-    ------
-    PvidError
-        Where fixed point cannot compute a function: a divisor that may be 0, a square root, a value too large.
+    Raises PvidError where fixed point cannot compute a function: a divisor that may be 0, a square root, a value too
+    large.
     """
     functions.model.refuse_constraints("fixed point")
     reaches = reaches_of(functions, given or Reaches())

@@ -22,19 +22,13 @@ _SLACK = 1e-12  # relative: the bounds are computed in float64
 def bounds_of(program: Program, arguments: Sequence[Interval], where: str) -> list[Interval]:
     """Least and greatest value at each place of the list.
 
+    Raises PvidError where a divisor may be 0, or the argument of a root negative.
+
     Parameters
     ----------
-    program
-        The list.
-    arguments
-        Bounds of the inputs.
-    where
-        What is computed, for the error.
-
-    Raises
-    ------
-    PvidError
-        Where a divisor may be 0, or the argument of a root negative.
+    program : the list
+    arguments : bounds of the inputs
+    where : what is computed, for the error
     """
     found: list[Interval] = []
     for value in program.values:
@@ -154,19 +148,13 @@ def nearest(value: Fraction) -> int:
 def fixed(program: Program, arguments: Sequence[Interval], where: str) -> FixedProgram:
     """Formats from the bounds of the inputs.
 
+    Raises PvidError where a divisor may be 0, a value is too large for any format, or there is a square root.
+
     Parameters
     ----------
-    program
-        The list.
-    arguments
-        Bounds of the inputs.
-    where
-        What is computed, for the errors.
-
-    Raises
-    ------
-    PvidError
-        Where a divisor may be 0, a value is too large for any format, or there is a square root.
+    program : the list
+    arguments : bounds of the inputs
+    where : what is computed, for the errors
     """
     bounds = bounds_of(program, arguments, where)
     bits: list[int] = []

@@ -169,19 +169,13 @@ def functions_of(
 ) -> ModelFunctions:
     """What is generated of a model.
 
+    Raises PvidError where a parameter is in no theta, an expression has no C, or the model has the library's name.
+
     Parameters
     ----------
-    model
-        As compiled; its known constants become literals.
-    widths
-        Argument of a sgn, as in phi_1 -> width of a soft sign instead; see operations.program_of.
-    signs_are_inputs
-        The caller computes every sgn and passes it as an input.
-
-    Raises
-    ------
-    PvidError
-        Where a parameter is in no theta, an expression has no C, or the model has the library's name.
+    model : as compiled; its known constants become literals
+    widths : argument of a sgn, as in phi_1 -> width of a soft sign instead; see operations.program_of
+    signs_are_inputs : the caller computes every sgn and passes it as an input
     """
     name = identifiers([model.name])[0]
     if name.lower() == "pvid":

@@ -95,10 +95,7 @@ class GeneratedModel:
     def functions(self) -> ModelFunctions:
         """Of the rows: names, lists of operations, terms and kinds.
 
-        Raises
-        ------
-        PvidError
-            Where a function cannot be generated; for a soft sign that is in no channel.
+        Raises PvidError where a function cannot be generated; for a soft sign that is in no channel.
         """
         soft_signs, name = self.options.soft_signs, self.compiled.name
         made = functions_of(self.compiled, soft_signs)

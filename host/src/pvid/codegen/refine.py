@@ -198,20 +198,14 @@ def refine_functions_of(
 ) -> RefineFunctions:
     """What is generated of a model.
 
+    Raises PvidError where the equations do not determine a motion.
+
     Parameters
     ----------
-    model
-        As compiled.
-    widths
-        Argument of a sgn, as in phi_1 -> width of v / (v^4 + width^4)^(1/4) in its place; those of the others are
+    model : as compiled
+    widths : argument of a sgn, as in phi_1 -> width of v / (v^4 + width^4)^(1/4) in its place; those of the others are
         refined. None: widths and known constants are settings, arguments behind r.
-    skew
-        r has one.
-
-    Raises
-    ------
-    PvidError
-        Where the equations do not determine a motion.
+    skew : r has one
     """
     return _Refine(model, widths, skew).functions()
 
@@ -535,10 +529,8 @@ class _Refine:
     def _in_turn(self, matrix: sp.Matrix) -> list[tuple[list[int], list[int]]]:
         """Rows and columns of the smallest blocks that can be solved one behind the other, each with those before it.
 
-        Raises
-        ------
-        PvidError
-            Where the equations do not determine their highest derivatives, or more than three only together.
+        Raises PvidError where the equations do not determine their highest derivatives, or more than three only
+        together.
         """
         equation_of: dict[int, int] = {}  # highest derivative -> the equation that is solved for it
 

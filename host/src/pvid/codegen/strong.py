@@ -66,10 +66,8 @@ class StrongFunctions:
 def strong_functions_of(model: CompiledModel) -> StrongFunctions:
     """What is generated for the strong form; `model` is that of pvid.model.strong.strong_form.
 
-    Raises
-    ------
-    PvidError
-        Where a row needs a derivative above the fourth, or an integral that the strong form has no state for.
+    Raises PvidError where a row needs a derivative above the fourth, or an integral that the strong form has no state
+    for.
     """
     functions = functions_of(model)
     if functions.top > 0:

@@ -113,10 +113,7 @@ class StrongModelIdentifier(Stepper):
 def strong_native(strong: StrongFunctions, config: StrongModelConfig) -> StrongModelNative:
     """The library of the strong form of a model, with rings that hold the bank.
 
-    Raises
-    ------
-    PvidError
-        When there is no compiler.
+    Raises PvidError when there is no compiler.
     """
     name = strong.functions.name
     words = {"name": name, "upper": name.upper()}

@@ -53,13 +53,7 @@ class FixedStrong:
 
 
 def fixed_strong(strong: StrongFunctions, reaches: Sequence[float], bounds: Sequence[Interval]) -> FixedStrong:
-    """Formats of the rows; `bounds`: of p.
-
-    Raises
-    ------
-    PvidError
-        Where fixed point cannot compute the rows, theta or C.
-    """
+    """Formats of the rows; `bounds`: of p. Raises PvidError where fixed point cannot compute the rows, theta or C."""
     functions = strong.functions
     given = [symmetric(one) for one in reaches]
     row = fixed(strong.row.program, given, f"{functions.name}, row")

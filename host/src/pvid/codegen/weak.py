@@ -111,10 +111,7 @@ class WeakFunctions:
 def weak_functions_of(compiled: CompiledModel) -> WeakFunctions:
     """What is generated for the weak identifier; `compiled` is the model without corners.
 
-    Raises
-    ------
-    PvidError
-        Where a channel needs what the identifier has no state for.
+    Raises PvidError where a channel needs what the identifier has no state for.
     """
     made = ready(compiled)
     model, whole = made.model, made.channels
@@ -172,10 +169,7 @@ def theta_model(functions: ModelFunctions) -> ThetaModel:
 def weak_model_of(compiled: CompiledModel) -> WeakModel:
     """The tables of a compiled model, without corners as given.
 
-    Raises
-    ------
-    PvidError
-        Where the identifier does not have what the model needs.
+    Raises PvidError where the identifier does not have what the model needs.
     """
     refuse_too_many_unknowns(compiled)
     made = weak_functions_of(compiled)

@@ -24,10 +24,7 @@ def weak_sources(
 ) -> ModelSources:
     """C of a model, with arrays that hold a design; `refine`: with the second stage.
 
-    Raises
-    ------
-    PvidError
-        When the identifier does not have what the model needs.
+    Raises PvidError when the identifier does not have what the model needs.
     """
     model = GeneratedModel(compiled, _MADE_BY)
     name = model.weak.needed.name

@@ -70,10 +70,7 @@ class FixedWeak:
 def fixed_weak(made: WeakFunctions, given: JetReaches | None = None) -> FixedWeak:
     """Formats of the functions of a model.
 
-    Raises
-    ------
-    PvidError
-        Where fixed point cannot compute a function, with the quantity.
+    Raises PvidError where fixed point cannot compute a function, with the quantity.
     """
     made.model.refuse_constraints("fixed point")
     chosen = given or JetReaches()
@@ -186,10 +183,7 @@ class ParametersQ31:
 def fixed_parameters(functions: ModelFunctions, bounds: Sequence[Interval]) -> ParametersQ31:
     """Formats from the bounds of p.
 
-    Raises
-    ------
-    PvidError
-        Where theta or C may be infinite within the bounds, with its name.
+    Raises PvidError where theta or C may be infinite within the bounds, with its name.
     """
     p_bits = tuple(bits_of(one) for one in bounds)
     theta_bits = _bits_of_p(functions, functions.theta, bounds)

@@ -72,13 +72,7 @@ def _checked(name: str, sizes: Mapping[str, int]) -> dict[str, int]:
 
 
 def sizes_of_model(model: WeakModel) -> dict[str, int]:
-    """Macro -> least value.
-
-    Raises
-    ------
-    PvidError
-        Where the model needs more than the core allows.
-    """
+    """Macro -> least value. Raises PvidError where the model needs more than the core allows."""
     thetas = [one.thetas for one in model.kind]
     sizes = {
         "PVID_MAX_THETA": model.model.n_theta,

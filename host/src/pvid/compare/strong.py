@@ -52,10 +52,8 @@ class StrongComparison:
     ) -> StrongComparison:
         """Runs a recording through both.
 
-        Raises
-        ------
-        PvidError
-            When there is no C compiler, the recording is too short, or fixed point does not have what the model needs.
+        Raises PvidError when there is no C compiler, the recording is too short, or fixed point does not have what the
+        model needs.
         """
         if core == STRONG_FIXED.name:
             return cls._fixed(strong_design_to_identify(model, recording, law), model.p_names, progress)

@@ -32,14 +32,11 @@ def compare_recording(
 ) -> Comparison:
     """Runs a recording through the identifier and its twin, with the design that `identify` chooses.
 
+    Raises PvidError when there is no C compiler, or the identifier does not have what the model needs.
+
     Parameters
     ----------
     ranking : of the analysis of the recording, where there is one: the design is not searched for again
-
-    Raises
-    ------
-    PvidError
-        When there is no C compiler, or the identifier does not have what the model needs.
     """
     return _COMPARISONS[core](compiled, recording, progress, ranking)
 

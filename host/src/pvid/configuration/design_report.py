@@ -75,23 +75,14 @@ class DesignReport:
 def report_for_recording(compiled: CompiledModel, recording: Recording) -> DesignReport:
     """The design that `identify --core f32` and `model build --run` choose for a recording.
 
-    Raises
-    ------
-    PvidError
-        When the recording is too short, or the identifier does not have what the model needs.
+    Raises PvidError when the recording is too short, or the identifier does not have what the model needs.
     """
     chosen = design_for_recording(ready(compiled), recording.signals, recording.sample_rate)
     return DesignReport(compiled, chosen, len(recording) / recording.sample_rate)
 
 
 def report_for_rig(compiled: CompiledModel) -> DesignReport:
-    """The design of a shipped mechanism's simulated rig.
-
-    Raises
-    ------
-    PvidError
-        Where the mechanism has none.
-    """
+    """The design of a shipped mechanism's simulated rig. Raises PvidError where the mechanism has none."""
     if compiled.name not in names_of_shipped():
         raise PvidError(f"{compiled.name} has no simulated rig: give a recorded run, --run RUN")
     rig = simulated_rig(compiled.name)
@@ -106,10 +97,7 @@ def report_for_rig(compiled: CompiledModel) -> DesignReport:
 def designs_tried(compiled: CompiledModel, recording: Recording) -> tuple[list[Scored], Scored]:
     """Designs of the analysis in float64, the best first, and the one that the identifier gets.
 
-    Raises
-    ------
-    PvidError
-        When the recording is too short.
+    Raises PvidError when the recording is too short.
     """
     model, rate = ready(compiled), recording.sample_rate
     ranking = ranked(model, recording.signals, rate)

@@ -118,6 +118,8 @@ def designed(
 ) -> Excitation:
     """The excitation of a rig.
 
+    Raises PvidError where an input has no limit, or nothing within the limits identifies the mechanism.
+
     Parameters
     ----------
     limits : tables of the rig file's [excitation]; "": its own keys
@@ -125,11 +127,6 @@ def designed(
     samples : names of the samples of a tick
     search : amplitudes for the least standard errors; False: by rule, equal ones, nothing is predicted
     progress : called with the number of simulated drives
-
-    Raises
-    ------
-    PvidError
-        Where an input has no limit, or nothing within the limits identifies the mechanism.
     """
     burst = limits.get("", {})
     of_drive = _drive_signals(compiled)

@@ -53,16 +53,13 @@ def nominal_run(
 ) -> NominalRun:
     """The run of a rig's guess.
 
+    Raises PvidError without a sample rate, with tones for a mechanism that has not one drive, or where there is no such
+    run (see `scaled_rig`).
+
     Parameters
     ----------
     tones : of another drive, as in Sines; none: the shipped rig's, scaled
     duration : [s]; None: the shipped rig's, scaled
-
-    Raises
-    ------
-    PvidError
-        Without a sample rate, with tones for a mechanism that has not one drive, or where there is no such run (see
-        `scaled_rig`).
     """
     if rig.sample_rate is None:
         raise PvidError("sample_rate is required in the rig file: the board samples on its own clock")

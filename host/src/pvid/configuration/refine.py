@@ -56,17 +56,14 @@ def refine_design(
 ) -> RefineConfig:
     """Settings of the refinement for a rig, behind its weak form.
 
+    Raises PvidError where the refinement in C does not have what the model needs: the reason in a sentence.
+
     Parameters
     ----------
     config : of the weak form
     run : of the rig: name of each signal -> samples
     p : parameters near those of the rig; None: those that the weak form starts at
     soft_signs : argument of a sign -> width of the soft sign in its place
-
-    Raises
-    ------
-    PvidError
-        Where the refinement in C does not have what the model needs: the reason in a sentence.
     """
     before = [one.name for one in compiled.signals if one.edge == "before"]
     if before:
@@ -101,17 +98,15 @@ def refine_settings(
 ) -> RefineConfig:
     """From a run of the rig.
 
+    Raises PvidError where the refinement in C does not have an input of the model, or samples are too slow for the
+    motion.
+
     Parameters
     ----------
     run : name of each signal -> samples
     rate : [Hz]
     p : parameters near those of the rig, as the weak form has them
     block_s : length of a block: about two periods of the slowest motion
-
-    Raises
-    ------
-    PvidError
-        Where the refinement in C does not have an input of the model, or samples are too slow for the motion.
     """
     model = made.model
     weak = weak_model_of(model)

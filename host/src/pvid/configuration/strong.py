@@ -84,10 +84,8 @@ class StrongDesign:
 def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY) -> StrongDesign:
     """Window and settings for a recording without missing samples.
 
-    Raises
-    ------
-    PvidError
-        Where the recording is too short, or the strong form of the model needs what the core does not have.
+    Raises PvidError where the recording is too short, or the strong form of the model needs what the core does not
+    have.
     """
     strong = renamed(strong_functions_of(strong_form(model)))
     oracle = StrongModel(model)
@@ -106,10 +104,7 @@ def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STA
 def five_point_design(model: CompiledModel, recording: Recording) -> StrongDesign:
     """The same with central differences of five points, for a recording whose noise they bear: no ring is shorter.
 
-    Raises
-    ------
-    PvidError
-        As `strong_design`.
+    Raises PvidError as `strong_design`.
     """
     strong = renamed(strong_functions_of(strong_form(model)))
     oracle = StrongModel(model)

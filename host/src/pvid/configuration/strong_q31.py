@@ -74,14 +74,11 @@ def fixed_design(
 ) -> StrongDesignQ31:
     """What a design of the recording is in fixed point.
 
+    Raises PvidError where fixed point does not have what the model needs.
+
     Parameters
     ----------
     between_counts : as of pvid.configuration.weak_q31.weak_q31_for_run
-
-    Raises
-    ------
-    PvidError
-        Where fixed point does not have what the model needs.
     """
     strong, fitted = base.strong, base.fitted
     bank = savitzky_golay(fitted.taps, fitted.degree)
@@ -223,10 +220,7 @@ def _raw(made: FixedStrong, lsb: Sequence[float]) -> dict[int, tuple[int, Rescal
 def _units(made: FixedStrong, oracle: StrongModel, rows: StrongRows, p: Float) -> tuple[float, ...]:
     """The standard deviation that each kind of row is counted in [unit of its Y]: of its noise and of its rounding.
 
-    Raises
-    ------
-    PvidError
-        Where the rounding leaves a kind no digits.
+    Raises PvidError where the rounding leaves a kind no digits.
     """
     found = []
     parameters = oracle.parameters

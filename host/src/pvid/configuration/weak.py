@@ -50,6 +50,8 @@ def weak_config(
 ) -> WeakConfig:
     """Settings of the identifier for a rig, from a run of it.
 
+    Raises PvidError where the identifier does not have what the model or the design needs.
+
     Parameters
     ----------
     run : name of each signal -> samples [n]
@@ -58,11 +60,6 @@ def weak_config(
     start_there : the identifier starts at the parameters of this run; False: at the guesses
     shared : its standard errors contain those that all windows share; False: the run is all that is judged
     found : the analysis of this run, whose shared errors they are; None: those of the design
-
-    Raises
-    ------
-    PvidError
-        Where the identifier does not have what the model or the design needs.
     """
     made = weak_tables(compiled, run, design, p)
     config = config_of(
@@ -221,10 +218,7 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
     """Settings for the shipped rig of a mechanism, with its own design, and for its simulation, which is exact: there
     are no shared errors.
 
-    Raises
-    ------
-    PvidError
-        Where the mechanism has no shipped rig.
+    Raises PvidError where the mechanism has no shipped rig.
     """
     run, design, p = simulated_run_of(compiled, functions)
     return weak_config(compiled, run, design, p)

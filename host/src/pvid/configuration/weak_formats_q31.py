@@ -31,14 +31,11 @@ _MEAN_BITS = 24  # of the mean of a column in standard deviations: its block of 
 def row_formats(rows: WeakRows, p: Float, errors: Sequence[EquationError] | None = None) -> tuple[tuple[int, ...], int]:
     """n_bits of all kinds and y_bits, from the white rows of a run at p.
 
+    Raises PvidError where rows are so large beside their noise that fixed point has no digit for it.
+
     Parameters
     ----------
     errors : of the equations themselves, of each kind; None by default
-
-    Raises
-    ------
-    PvidError
-        Where rows are so large beside their noise that fixed point has no digit for it.
     """
     theta = rows.compiled.parameters.theta(p)
     found = list(errors or [EquationError()] * rows.kinds)

@@ -47,21 +47,17 @@ def weak_q31_for_run(
 ) -> WeakQ31:
     """The identifier for a rig, from a run of it.
 
+    Raises PvidError where fixed point, or the identifier, does not have what the model or the design needs.
+
     Parameters
     ----------
     design : of the oracle; the identifier gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
     start_there : the identifier starts at the parameters of this run; False: at the guesses
-    between_counts
-        samples of the run that lie between counts, as with an offset taken off, are not rounded to them: the identifier
-        gets finer counts; False: those of the sensor, as of a board
+    between_counts : samples of the run that lie between counts, as with an offset taken off, are not rounded to them:
+        the identifier gets finer counts; False: those of the sensor, as of a board
     soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
     shared, found : as of weak_config
-
-    Raises
-    ------
-    PvidError
-        Where fixed point, or the identifier, does not have what the model or the design needs.
     """
     functions = weak_functions_of(compiled)
     tables_of_run = weak_tables(compiled, run, design, p)

@@ -96,10 +96,7 @@ class Headers:
     def of(library: Path) -> Headers:
         """Those that `library` was built with; of a library without them, those of the build in this checkout.
 
-        Raises
-        ------
-        PvidError
-            When there are none.
+        Raises PvidError when there are none.
         """
         beside = library.with_name(HEADERS)
         path = beside if beside.exists() else _built().with_name(HEADERS)

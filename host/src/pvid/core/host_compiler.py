@@ -16,14 +16,11 @@ from pvid.core.sources import cache_folder
 def host_compiler(what: str) -> str:
     """Path of the one that CC names, else of cc, gcc or clang.
 
+    Raises PvidError when there is none.
+
     Parameters
     ----------
     what : needs it, for the message
-
-    Raises
-    ------
-    PvidError
-        When there is none.
     """
     for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
         found = shutil.which(name) if name else None
@@ -51,15 +48,12 @@ def compiled_once() -> Mapping[str, str]:
 def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], folder: Path) -> list[str]:
     """Compiles each source into a folder, side by side; the names of the objects.
 
+    Raises PvidError when the compiler refuses one; the sentence has its first error.
+
     Parameters
     ----------
     options : paths in them are from the folder; where they do not name it, ccache finds the objects of another one
         without reading a header
-
-    Raises
-    ------
-    PvidError
-        When the compiler refuses one; the sentence has its first error.
     """
     ccache = shutil.which("ccache")
     environment = compiled_once()
@@ -77,13 +71,7 @@ def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], f
 def run_compiler(
     command: Sequence[str], environment: Mapping[str, str] | None = None, folder: Path | None = None
 ) -> str:
-    """What it prints; it is started in a folder.
-
-    Raises
-    ------
-    PvidError
-        When it fails, with its first error.
-    """
+    """What it prints; it is started in a folder. Raises PvidError when it fails, with its first error."""
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=folder)
     if done.returncode != 0:
         lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]

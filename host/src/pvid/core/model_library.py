@@ -57,6 +57,8 @@ def model_library(
 ) -> Path:
     """The shared library, beside it what cffi reads.
 
+    Raises PvidError when there is no compiler, or it refuses the code; or somebody changes the core meanwhile.
+
     Parameters
     ----------
     name : of the mechanism, for the file's name
@@ -64,11 +66,6 @@ def model_library(
     sizes : PVID_MAX_ macro -> value
     build : its arithmetic, or the strong form
     headers : names of the texts that cffi reads; None: all headers
-
-    Raises
-    ------
-    PvidError
-        When there is no compiler, or it refuses the code; or somebody changes the core meanwhile.
     """
     compiler = host_compiler(_WHAT)
     definitions = options_of(sizes)

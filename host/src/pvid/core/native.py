@@ -63,24 +63,17 @@ _ARITHMETIC: dict[Core, Arithmetic] = {
 class Native:
     """One build of the C core.
 
+    Raises PvidError when the library is missing.
+
     Parameters
     ----------
-    path
-        The shared library; by default the one tools/pvid builds.
+    path : the shared library; by default the one tools/pvid builds
 
     Attributes
     ----------
-    path
-        The library.
-    headers
-        The declarations that the library was built with.
-    library
-        Its functions and constants, by their names in C.
-
-    Raises
-    ------
-    PvidError
-        When the library is missing.
+    path : the library
+    headers : the declarations that the library was built with
+    library : its functions and constants, by their names in C
     """
 
     def __init__(self, path: Path | None = None) -> None:
@@ -104,16 +97,11 @@ class Stepper:
 
     Parameters
     ----------
-    name, core
-        pvid_<name>_<core> is its type in C, and the names of its functions likewise.
-    config
-        Settings with the attributes of the C configuration's fields.
-    replay
-        pvid_replay_<replay>_<core> steps it.
-    also
-        Further settings that its init checks.
-    given
-        Fields of the C configuration that the settings do not have.
+    name, core : pvid_<name>_<core> is its type in C, and the names of its functions likewise
+    config : settings with the attributes of the C configuration's fields
+    replay : pvid_replay_<replay>_<core> steps it
+    also : further settings that its init checks
+    given : fields of the C configuration that the settings do not have
     """
 
     _configured: str | None = None  # pvid_<..>_config_<core> is the configuration's type; None: <name>

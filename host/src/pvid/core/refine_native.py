@@ -38,10 +38,7 @@ class RefineRecord:
 class RefineNative:
     """An initialised refinement in C memory; its state persists between calls of `run`.
 
-    Raises
-    ------
-    PvidError
-        When init refuses the configuration.
+    Raises PvidError when init refuses the configuration.
     """
 
     def __init__(self, native: Native, config: RefineConfig) -> None:

@@ -75,10 +75,7 @@ def _name(path: Path) -> str:
 def core_files(deployment: Deployment) -> Files:
     """Name -> text; pvid/config.h takes the sizes of the rig from pvid/rig_sizes.h.
 
-    Raises
-    ------
-    PvidError
-        When pvid/config.h has no place for them.
+    Raises PvidError when pvid/config.h has no place for them.
     """
     found = _files(deployment.arithmetic, deployment.second is not None, deployment.excitation is not None)
     found |= _included(deployment.generated.values(), found)

@@ -43,6 +43,8 @@ def deployment_f32(
 ) -> Deployment:
     """In float32.
 
+    Raises PvidError where the identifier does not have what the model needs.
+
     Parameters
     ----------
     config : settings and tables for the rig
@@ -50,11 +52,6 @@ def deployment_f32(
     command : that makes it, for the banners
     refine : settings of the refinement; None: the package has none
     excitation : of the commissioning; None: the package has none
-
-    Raises
-    ------
-    PvidError
-        Where the identifier does not have what the model needs.
     """
     made, design = weak_functions_of(compiled), config.design
     model, name = design.model, design.model.name

@@ -24,14 +24,11 @@ TARGETS: Mapping[str, Callable[[Deployment], Files]] = {
 def write_package(deployment: Deployment, target: str, folder: Path) -> list[Path]:
     """Writes the files of a package.
 
+    Raises PvidError where the folder has other files: two packages in one would be compiled together.
+
     Returns
     -------
     Their paths.
-
-    Raises
-    ------
-    PvidError
-        Where the folder has other files: two packages in one would be compiled together.
     """
     files = TARGETS[target](deployment)
     if folder.is_dir():

@@ -41,12 +41,9 @@ def bank_header(bank: FirBank, name: str, made_by: str) -> str:
 
     Parameters
     ----------
-    bank
-        The design.
-    name
-        Name of the array in C.
-    made_by
-        The command that makes it, for the banner; no date, so that the same command makes the same file.
+    bank : the design
+    name : name of the array in C
+    made_by : the command that makes it, for the banner; no date, so that the same command makes the same file
     """
     array = float_array(name, bank.weights32, "[order][point - 1], order k per point^k: see pvid/differentiator.h")
     banner = [
@@ -75,14 +72,11 @@ def struct_initializer(headers: Headers, struct: Any, pointers: Mapping[str, str
 
     Parameters
     ----------
-    headers
-        The declarations of its type.
-    struct
-        Its fields are numbers, arrays of them, structs and pointers.
-    pointers
-        C expression of each pointer, by its field's name: "replay_weights", "&replay_design"; null without an entry.
-    indent
-        Of the line where it begins.
+    headers : the declarations of its type
+    struct : its fields are numbers, arrays of them, structs and pointers
+    pointers : C expression of each pointer, by its field's name: "replay_weights", "&replay_design"; null without an
+        entry
+    indent : of the line where it begins
     """
     inner = f"{indent}    "
     lines = []

@@ -75,17 +75,14 @@ class Decimator:
 def fir(taps: int, decimation: int, order: int, edge: float) -> Fir:
     """One filter.
 
+    Raises PvidError when the length is even or below 9, or the pass band reaches half the sample rate.
+
     Parameters
     ----------
     taps : length [samples], odd
     decimation : D
     order : of the derivative, 0 or 2
     edge : of the pass band [cycles per sample], below 0.5
-
-    Raises
-    ------
-    PvidError
-        When the length is even or below 9, or the pass band reaches half the sample rate.
     """
     if taps % 2 == 0 or taps < MIN_TAPS:
         raise PvidError(f"taps must be odd and at least {MIN_TAPS}, not {taps}")

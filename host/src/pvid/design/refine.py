@@ -35,13 +35,7 @@ _SPARE = 16  # entries of the ring
 
 
 def refine_config(rig: RefineRig, forgetting_s: float = 0.0, outlier_gate: float = 4.0) -> RefineConfig:
-    """The settings that evidence recommends.
-
-    Raises
-    ------
-    PvidError
-        When samples are too slow for the steps of the motion.
-    """
+    """The settings that evidence recommends. Raises PvidError when samples are too slow for the steps of the motion."""
     ratio, parts, fine = _steps_of(rig)
     of_big_step = _JOBS_OF_A_PART * parts + _OTHER_JOBS if rig.runge_kutta else _JOBS
     free = max(ratio - 1, 1)  # ticks of a step that have jobs

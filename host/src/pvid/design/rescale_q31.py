@@ -18,10 +18,7 @@ def shift_to(most: float, bits: float) -> int:
 def rescale_to(most: float, gain: float, name: str) -> Rescale:
     """From sums of at most `most` to `gain` times them; beyond, the result saturates.
 
-    Raises
-    ------
-    PvidError
-        Where no shift of 64 bits does it.
+    Raises PvidError where no shift of 64 bits does it.
     """
     down = shift_to(most, _FIRST)
     factor = gain * 2.0**down

@@ -95,14 +95,11 @@ def most_counts(signals: Sequence[WeakSignal], samples: int, decimation: int) ->
 def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, formats: Formats) -> WeakDesignQ31:
     """Tables and formats of a weak form for sensors that count.
 
+    Raises PvidError where a quantity does not fit, with its name.
+
     Parameters
     ----------
     sizes : the float32 design, with its filters, noise and term factors
-
-    Raises
-    ------
-    PvidError
-        Where a quantity does not fit, with its name.
     """
     margins = _Margins()
     for name, full in enumerate(sensing.full_scale):

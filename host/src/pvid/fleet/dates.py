@@ -20,10 +20,7 @@ def began_of(path: Path) -> tuple[float, str]:
 
     A text says it in its first 8192 bytes: a date with a time of day (taken as UTC), or a clock that counts since 1970.
 
-    Raises
-    ------
-    OSError
-        When it cannot be read.
+    Raises OSError when it cannot be read.
     """
     with path.open("rb") as file:
         head = file.read(_HEAD)

@@ -51,10 +51,7 @@ class Question:
         """Sixteen digits that change with the content of the recordings, the rig files beside them, the question or the
         version.
 
-        Raises
-        ------
-        OSError
-            When it cannot be read.
+        Raises OSError when it cannot be read.
         """
         digest = hashlib.sha256(repr((__version__, self, *(path.name for path in paths))).encode())
         others = [Path(one) for one in (self.model, self.rig) if one is not None]

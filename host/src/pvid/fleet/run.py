@@ -23,6 +23,8 @@ def run(
 ) -> list[Row]:
     """Identifies what the store does not have yet, and writes its file; a row for each path, by board and time.
 
+    Raises PvidError when there is no path, or as of pvid.base.cluster.client.
+
     Parameters
     ----------
     paths : of the recordings; workers on other machines read them under the same names
@@ -30,11 +32,6 @@ def run(
     scheduler : address of a running scheduler of dask.distributed; None: processes on this machine
     workers : number of these processes; None: one a processor. One is this process
     together : recordings of one folder are identified together, and have one row
-
-    Raises
-    ------
-    PvidError
-        When there is no path, or as of pvid.base.cluster.client.
     """
     files = list(dict.fromkeys(str(Path(one)) for one in paths))
     if not files:

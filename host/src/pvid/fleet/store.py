@@ -25,14 +25,11 @@ _NEWER = {"predicted", "report", "dated"}  # which older files do not have
 class Store:
     """The rows that `out` and, until all are there, a partial file beside it contain.
 
+    Raises PvidError when the name is no .parquet, its folder does not exist, or the file contains something else.
+
     Parameters
     ----------
     out : the Parquet file
-
-    Raises
-    ------
-    PvidError
-        When the name is no .parquet, its folder does not exist, or the file contains something else.
     """
 
     def __init__(self, out: Path) -> None:
@@ -58,10 +55,7 @@ class Store:
     def add(self, row: Row) -> None:
         """Keeps a row, in the partial file too; a recording that cannot be read is tried again next time.
 
-        Raises
-        ------
-        PvidError
-            When it cannot be written.
+        Raises PvidError when it cannot be written.
         """
         if row.key:
             self.rows[row.key] = row
@@ -70,10 +64,7 @@ class Store:
     def finish(self, rows: Iterable[Row]) -> None:
         """Writes the Parquet file with these rows; the partial file vanishes.
 
-        Raises
-        ------
-        PvidError
-            When it cannot be written.
+        Raises PvidError when it cannot be written.
         """
         arrow, parquet = _arrow()
         found = list(rows)
@@ -107,13 +98,7 @@ def _flat(row: Row) -> Mapping[str, Any]:
 
 
 def read_rows(path: Path) -> list[Row]:
-    """The rows of a Parquet file; none where there is no file.
-
-    Raises
-    ------
-    PvidError
-        When it is something else.
-    """
+    """The rows of a Parquet file; none where there is no file. Raises PvidError when it is something else."""
     if not path.exists():
         return []
     _, parquet = _arrow()

@@ -60,10 +60,7 @@ def added(answer: Analysis, rig: MechanismRig, terms: Sequence[str]) -> Addition
 
     A term without its equation goes to the one in which it leaves the smallest residuals.
 
-    Raises
-    ------
-    PvidError
-        Where a term cannot be read or compiled, or the recording does not contain it.
+    Raises PvidError where a term cannot be read or compiled, or the recording does not contain it.
     """
     out = Additions(rig, (), ())
     for term in terms:

@@ -32,15 +32,12 @@ def analysed(
 ) -> Analysis:
     """Parameters of a mechanism from all segments of a recording.
 
+    Raises PvidError when the recording is too short, or holds a signal beyond all reason.
+
     Parameters
     ----------
     own : unknowns that have a value of their own in each of several recordings
     weights : of the rows, as in pvid.oracle.weak.identify
-
-    Raises
-    ------
-    PvidError
-        When the recording is too short, or holds a signal beyond all reason.
     """
     model.refuse_robot()
     refuse_constant(recording, model)
@@ -89,15 +86,12 @@ def own_of(
 ) -> tuple[str, ...]:
     """Unknowns that have a value of their own in each of several recordings: these, and offsets of sensors.
 
+    Raises PvidError for a name that is no unknown of the model, and where there is one recording, or the C core.
+
     Parameters
     ----------
     own, shared : names that were asked for
     in_c : for the C core, which has one value of each
-
-    Raises
-    ------
-    PvidError
-        For a name that is no unknown of the model, and where there is one recording, or the C core.
     """
     for option, names in (("own", own), ("shared", shared)):
         for name in names:

@@ -61,9 +61,8 @@ class Value:
     Attributes
     ----------
     value, se : its standard error; None where it is not identified
-    se_noise, se_scale, se_model
-        its parts, whose squares add up to its own: from noise; from gains, constants, the clock and linearised
-        equations; from what the equations seem to lack
+    se_noise, se_scale, se_model : its parts, whose squares add up to its own: from noise; from gains, constants, the
+        clock and linearised equations; from what the equations seem to lack
     status, reason : whether the run determines it; a clause where it does not, or where it may be 0
     below : it is below this with 95 %, where it may be 0
     word : what it may be used for

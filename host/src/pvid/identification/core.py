@@ -225,10 +225,7 @@ class _Run:
 def identify_in_c(answer: Analysis, core: Core = "f32") -> CoreAnswer:
     """The same recording by the C core.
 
-    Raises
-    ------
-    PvidError
-        When there is no C compiler, or the identifier does not have what the model needs.
+    Raises PvidError when there is no C compiler, or the identifier does not have what the model needs.
     """
     try:
         run = _RUNS[core](answer)

@@ -184,10 +184,7 @@ class RefinedCoreAnswer(Answer):
 def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
     """The recording of an identification by the first stage in float32 (identify_in_c), by both stages in C.
 
-    Raises
-    ------
-    PvidError
-        When there is no C compiler, or the second stage does not have what the model needs.
+    Raises PvidError when there is no C compiler, or the second stage does not have what the model needs.
     """
     answer = weak.analysis
     config = config_to_identify(answer.model, answer.recording, answer.ranking)

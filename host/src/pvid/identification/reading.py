@@ -35,17 +35,14 @@ def read_all(
 ) -> tuple[Recording, CompiledModel]:
     """Recordings of one rig as one, and the model with the values of the rig.
 
+    Raises PvidError when one cannot be read.
+
     Parameters
     ----------
     sources : a file, or what reads a recording with given columns
     names : of the recordings, where there are several
     columns : the text of --columns
     whole : the longest stretch without a missing sample alone
-
-    Raises
-    ------
-    PvidError
-        When one cannot be read.
     """
     model = rig.applied(compiled_of(rig.model))
     given = parsed(columns, channels_of(model))

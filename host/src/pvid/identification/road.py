@@ -25,21 +25,16 @@ def identified(
 ) -> Analysis:
     """The answer that `identify` prints.
 
+    Raises PvidError when the recording is too short, or holds a signal beyond all reason.
+
     Parameters
     ----------
     weights : of the rows; those of the sensors alone are not compared with others
-    refine
-        the full equations are fitted to the whole recording, from the answer on; None: of a single recording, where the
-        model has equations of its own for that, because those of its rows are approximations
-    predict
-        with the prediction of unseen motion; where the equations do not explain the recording, publish the estimate
-        that predicts it best
+    refine : the full equations are fitted to the whole recording, from the answer on; None: of a single recording,
+        where the model has equations of its own for that, because those of its rows are approximations
+    predict : with the prediction of unseen motion; where the equations do not explain the recording, publish the
+        estimate that predicts it best
     own : unknowns that have a value of their own in each of several recordings
-
-    Raises
-    ------
-    PvidError
-        When the recording is too short, or holds a signal beyond all reason.
     """
     answer = analysed(recording, model, weights, own)
     answer = advised(answer)

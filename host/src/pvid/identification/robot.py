@@ -123,13 +123,7 @@ class RobotAnswer(Answer):
 
 
 def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
-    """Base parameters of a robot from all segments of a recording.
-
-    Raises
-    ------
-    PvidError
-        When the recording is too short.
-    """
+    """Base parameters of a robot from all segments of a recording. Raises PvidError when the recording is too short."""
     fit = identify_robot(model, recording.run, recording.sample_rate)
     signals = {one.name: one.gain_sd for one in model.signals if one.kind == "input"}
     constants = {one.name: one.sd / abs(one.value) for one in model.knowns if one.value}

@@ -105,14 +105,11 @@ def identify_strong_mechanism(
 ) -> StrongAnswer:
     """Parameters of a mechanism from a recording without missing samples: by the C core, or by the analysis alone.
 
+    Raises PvidError when the recording is too short, or the strong form of the model needs what the core does not have.
+
     Parameters
     ----------
     core : f32, q31; f64: the analysis
-
-    Raises
-    ------
-    PvidError
-        When the recording is too short, or the strong form of the model needs what the core does not have.
     """
     refuse_constant(recording, model)
     fixed = strong_design_to_identify(model, recording, law) if core == STRONG_FIXED.name else None

@@ -107,13 +107,7 @@ class _AsWritten(Columns):
 
 
 def surveyed(path: str | os.PathLike[str]) -> Survey:
-    """Looks at a file.
-
-    Raises
-    ------
-    PvidError
-        When it is no table, or none of its columns can be the time of another one.
-    """
+    """Looks at a file. Raises PvidError when it is no table, or none of its columns can be the time of another one."""
     path = Path(path)
     names = names_in(path)
     called = [k for k, name in enumerate(names) if TIME.is_called(name)]
@@ -129,13 +123,7 @@ def surveyed(path: str | os.PathLike[str]) -> Survey:
 
 
 def names_in(path: Path) -> tuple[str, ...]:
-    """The names of a file's columns; positions from 1 where it has none.
-
-    Raises
-    ------
-    PvidError
-        When it is no table.
-    """
+    """The names of a file's columns; positions from 1 where it has none. Raises PvidError when it is no table."""
     nobody = Columns((Channel(_NOBODYS_NAME, ""),))
     try:
         read_table(path, nobody)

@@ -86,16 +86,13 @@ class Motion:
     def near(cls, model: CompiledModel, signals: Mapping[str, Float], rate: float, p: Float) -> Motion:
         """From signals by name [n], NaN where a sample is missing, sampled at `rate` [Hz].
 
+        Raises PvidError where the equations cannot be simulated: an input is a derivative that no recorded signal
+        gives, or the recording is too short.
+
         Parameters
         ----------
         p : parameters near those that will be simulated [n_p]: the integration's step and the width of the signs are
             theirs
-
-        Raises
-        ------
-        PvidError
-            Where the equations cannot be simulated: an input is a derivative that no recorded signal gives, or the
-            recording is too short.
         """
         return cls(*problem_of(model, signals, rate, p))
 
@@ -198,16 +195,13 @@ def validated(
 ) -> Validation:
     """How well p predicts a recording, all of it that can be simulated.
 
+    Raises PvidError where the equations cannot be simulated on it, or the motion runs away.
+
     Parameters
     ----------
     p : all parameters of the model [n_p]
     window_s : of the weak form that gave p [s]
     own : names of those that are fitted to the recording, from p on
-
-    Raises
-    ------
-    PvidError
-        Where the equations cannot be simulated on it, or the motion runs away.
     """
     rate = recording.sample_rate
     with np.errstate(all="ignore"):
@@ -238,14 +232,11 @@ def of_fit(problem: Problem, found: Refined) -> Validation:
 def simulation_of(model: CompiledModel, recording: Recording, p: Float) -> dict[str, Float]:
     """What p predicts of a recording's longest stretch, simulated as a whole from the start that fits it best.
 
+    Raises PvidError where the equations cannot be simulated on it, or the motion runs away.
+
     Returns
     -------
     "t" [s], and of each sensor its readings [n].
-
-    Raises
-    ------
-    PvidError
-        Where the equations cannot be simulated on it, or the motion runs away.
     """
     recording = recording.whole()
     with np.errstate(all="ignore"):
@@ -262,13 +253,7 @@ def simulation_of(model: CompiledModel, recording: Recording, p: Float) -> dict[
 
 
 def p_of(model: CompiledModel, values: Mapping[str, float | None]) -> Float:
-    """Parameters by name as an array [n_p].
-
-    Raises
-    ------
-    PvidError
-        Where one has no value.
-    """
+    """Parameters by name as an array [n_p]. Raises PvidError where one has no value."""
     model.refuse_robot("a simulation")
     missing = [name for name in model.p_names if values.get(name) is None]
     if missing:
@@ -282,14 +267,11 @@ def predicted(
     """The same with values by name, as an answer has them. Parameters of which an answer from several recordings has a
     value for each, `m[A]` and `m[B]`, are fitted.
 
+    Raises PvidError also where a parameter has no value.
+
     Parameters
     ----------
     window_s : None: a twentieth of the recording
-
-    Raises
-    ------
-    PvidError
-        Also where a parameter has no value.
     """
     model.refuse_robot("a simulation")
     model = model.alone

@@ -164,10 +164,7 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     are error codes that have one value time and again; of any other signal, which may jump, those that no motion
     reaches.
 
-    Raises
-    ------
-    PvidError
-        Where more are far.
+    Raises PvidError where more are far.
     """
     changed = dict(recording.signals)
     notes = list(recording.notes)

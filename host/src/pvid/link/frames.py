@@ -102,10 +102,7 @@ class Layout:
     def unpack(self, payload: bytes) -> dict[str, Any]:
         """Values by field: int, float, tuple of them, str (char, printable ASCII) or bytes (the rest).
 
-        Raises
-        ------
-        PvidError
-            When the payload has not the length of this layout.
+        Raises PvidError when the payload has not the length of this layout.
         """
         if len(payload) < self.size or (len(payload) > self.size and not self.open_ended):
             raise PvidError(f"a frame {self.name} of {len(payload)} bytes, where {self.size} belong")
@@ -580,10 +577,7 @@ def parse_schema(text: str) -> dict[int, Layout]:
 
     The text comes over the line: one that describes no payload a frame can hold is refused.
 
-    Raises
-    ------
-    PvidError
-        When it is not one.
+    Raises PvidError when it is not one.
     """
     head, *lines = text.split("\n")
     if not _SCHEMA_HEAD.fullmatch(head):
@@ -686,10 +680,7 @@ def described_readers(text: str) -> Readers:
     """What a decoder reads frames with that `text` describes: a message of today where the layout is the same, or was
     before fields were added that may be absent, or more samples and parameters.
 
-    Raises
-    ------
-    PvidError
-        When it is no schema.
+    Raises PvidError when it is no schema.
     """
 
     def reader(layout: Layout) -> Callable[[bytes], Message]:

@@ -83,10 +83,7 @@ class BoardNames:
     def parse(cls, text: bytes) -> BoardNames:
         """From what a board sent.
 
-        Raises
-        ------
-        PvidError
-            Where it is not of this form, names something twice, or names too much or nothing.
+        Raises PvidError where it is not of this form, names something twice, or names too much or nothing.
         """
         if len(text) > MOST:
             raise PvidError(f"names of {len(text)} characters, and {MOST} are the most")

@@ -28,14 +28,11 @@ def open_port(name: str, *, keeps_input: bool = False) -> Port:
     """A serial port by device or URL, 115200 baud, for this program alone; DTR and RTS low, so that opening resets no
     board.
 
+    Raises PvidError when it cannot be opened; the sentence contains the cause.
+
     Parameters
     ----------
     keeps_input : whether what a device has received before is read, too; of a socket it always is
-
-    Raises
-    ------
-    PvidError
-        When it cannot be opened; the sentence contains the cause.
     """
     try:
         port = _unopened(name, keeps_input)

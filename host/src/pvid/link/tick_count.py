@@ -22,10 +22,8 @@ class TickCount:
 
         Parameters
         ----------
-        tick
-            Tick of the frame, with the upper bits that the frame contains.
-        session
-            Session number in the frame; 0: the frame has none.
+        tick : tick of the frame, with the upper bits that the frame contains
+        session : session number in the frame; 0: the frame has none
         """
         if session not in (0, self._session):
             if self._session != 0:

@@ -230,10 +230,7 @@ def export_log(log: Path, form: str, base: Path, mechanism: LogMechanism) -> lis
 
     `mechanism` of the rig: without its constants there are no outputs.
 
-    Raises
-    ------
-    PvidError
-        When the log cannot be read or a file cannot be written.
+    Raises PvidError when the log cannot be read or a file cannot be written.
     """
     kind = FORMATS[form]
     names = names_of_log(log)

@@ -130,17 +130,13 @@ def _key_of(path: Path) -> int | None:
 class LogWriter:
     """Appends to a log; every call has reached the operating system when it returns.
 
+    Raises PvidError when the file exists, another recorder writes it, or it cannot be made or written; so do the
+    methods.
+
     Parameters
     ----------
-    path
-        The log; it must not exist unless `append`.
-    rig
-        Text of the rig file that goes in front of every segment.
-
-    Raises
-    ------
-    PvidError
-        When the file exists, another recorder writes it, or it cannot be made or written; so do the methods.
+    path : the log; it must not exist unless `append`
+    rig : text of the rig file that goes in front of every segment
     """
 
     def __init__(self, path: Path, *, rig: str | None = None, append: bool = False) -> None:

@@ -28,17 +28,12 @@ class FoxgloveServer:
     A parameter of the mechanism is also one of Foxglove's: `R` and, for its standard error, `R_se`. A client that
     connects late gets the latest values of these and all later rows; a slow client misses rows, the log does not.
 
+    Raises PvidError when foxglove-sdk is not installed or the address cannot be used.
+
     Parameters
     ----------
-    address
-        As given, for messages.
-    mechanism
-        Of the rig; without its constants no outputs are served.
-
-    Raises
-    ------
-    PvidError
-        When foxglove-sdk is not installed or the address cannot be used.
+    address : as given, for messages
+    mechanism : of the rig; without its constants no outputs are served
     """
 
     def __init__(self, address: str, host: str, port: int, mechanism: LogMechanism = UNNAMED) -> None:

@@ -94,12 +94,9 @@ class History:
 
     Parameters
     ----------
-    mechanism
-        Of the rig; without its constants the outputs stay unknown.
-    points
-        Half of the most estimates that are kept.
-    window_s
-        How much of the samples is kept [s], as far as they are no more than 200 000.
+    mechanism : of the rig; without its constants the outputs stay unknown
+    points : half of the most estimates that are kept
+    window_s : how much of the samples is kept [s], as far as they are no more than 200 000
     """
 
     def __init__(self, mechanism: LogMechanism = UNNAMED, points: int = 400, window_s: float = 10.0) -> None:

@@ -34,15 +34,11 @@ _TELEPLOT_ROWS = 8  # a row of samples is at most 3 points of 46 bytes
 def live_stream(address: str, mechanism: LogMechanism = UNNAMED) -> Observer:
     """The observer that sends to `udp://host:port`, `teleplot://host:port` or serves `foxglove://host:port`.
 
+    Raises PvidError when the address is none, or what it needs is not installed.
+
     Parameters
     ----------
-    mechanism
-        Of the rig; without its constants no outputs are sent.
-
-    Raises
-    ------
-    PvidError
-        When the address is none, or what it needs is not installed.
+    mechanism : of the rig; without its constants no outputs are sent
     """
     try:
         parts = urlsplit(address)

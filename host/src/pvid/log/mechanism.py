@@ -35,20 +35,16 @@ def _none(p: Mapping[str, float], covariance: Float) -> Errors:
 class LogMechanism:
     """Names and units of what a log contains.
 
+    Raises PvidError where a name is that of another column.
+
     Attributes
     ----------
     name : of the mechanism
     samples, parameters : of a tick, and of p
     outputs : what follows from p; none where the board alone named them, or a constant that they need is not known
-    outputs_at
-        (p by name, its covariance in that order [n, n]) -> by name of the outputs their values and standard errors by
-        the delta method; empty where p is not that of a possible mechanism
+    outputs_at : (p by name, its covariance in that order [n, n]) -> by name of the outputs their values and standard
+        errors by the delta method; empty where p is not that of a possible mechanism
     known : values of its constants
-
-    Raises
-    ------
-    PvidError
-        Where a name is that of another column.
     """
 
     name: str
@@ -113,10 +109,7 @@ def _outputs_of(
 def mechanism_named(text: bytes) -> LogMechanism:
     """The mechanism that a board says it is.
 
-    Raises
-    ------
-    PvidError
-        Where the text breaks a rule of link.names, or a name is that of another column.
+    Raises PvidError where the text breaks a rule of link.names, or a name is that of another column.
     """
     names = BoardNames.parse(text)
     return LogMechanism(names.mechanism, names.samples, names.parameters)

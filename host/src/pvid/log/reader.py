@@ -378,10 +378,7 @@ class LogStream:
 class LogReader:
     """The records of a file, from its beginning at every iteration.
 
-    Raises
-    ------
-    PvidError
-        While iterating: when the file cannot be read or holds not one frame.
+    Raises PvidError while iterating: when the file cannot be read or holds not one frame.
     """
 
     def __init__(self, path: Path) -> None:

@@ -49,13 +49,7 @@ class Source(Protocol):
         """As it is shown and written into the log."""
 
     def open(self) -> Target:
-        """Opens it, for the first time or again.
-
-        Raises
-        ------
-        PvidError
-            When it is not there.
-        """
+        """Opens it, for the first time or again. Raises PvidError when it is not there."""
 
     @property
     def usb(self) -> dict[str, Any] | None:
@@ -149,8 +143,7 @@ class Recorder(threading.Thread):
 
     Parameters
     ----------
-    room
-        How many bytes may be read before more of the log is decoded; None: all that come. It holds for an emulator,
+    room : how many bytes may be read before more of the log is decoded; None: all that come. It holds for an emulator,
         which may send faster than frames are decoded and waits; a board on a line does not, and is read at once.
     """
 
@@ -257,12 +250,9 @@ class Starter:
 
     Parameters
     ----------
-    send
-        To the board.
-    begin
-        Makes a configuration, with a new session.
-    restart
-        Also a board that is configured already, whenever the link has come up.
+    send : to the board
+    begin : makes a configuration, with a new session
+    restart : also a board that is configured already, whenever the link has come up
     """
 
     def __init__(self, send: Callable[[Message], None], begin: Callable[[], Configuration], restart: bool) -> None:
@@ -275,13 +265,7 @@ class Starter:
         self._sent = float("-inf")
 
     def take(self, record: Record, account: Account) -> None:
-        """See logreader.Observer.
-
-        Raises
-        ------
-        RefusedError
-            When the board refuses.
-        """
+        """See logreader.Observer. Raises RefusedError when the board refuses."""
         match record.item:
             case Segment():
                 self._wanted, self._fresh = None, True
@@ -340,18 +324,12 @@ class Logger:
 
     Parameters
     ----------
-    rig
-        Text of the rig file that is written into the log.
-    append
-        Whether `out` may exist.
-    duration_s
-        Duration after the first connection [s]; None: until the end is requested.
-    samples
-        Ends by itself when so many have come, and of an emulator before some frames more have; None: likewise.
-    begin, restart
-        See Starter; without `begin` nothing is configured.
-    failures
-        Of observers, and of the stream that reads the log for them, in a sentence each.
+    rig : text of the rig file that is written into the log
+    append : whether `out` may exist
+    duration_s : duration after the first connection [s]; None: until the end is requested
+    samples : ends by itself when so many have come, and of an emulator before some frames more have; None: likewise
+    begin, restart : see Starter; without `begin` nothing is configured
+    failures : of observers, and of the stream that reads the log for them, in a sentence each
     """
 
     source: Source
@@ -372,13 +350,9 @@ class Logger:
     def run(self) -> Account:
         """Until SIGINT, SIGTERM or the duration; in the main thread.
 
-        Raises
-        ------
-        PvidError
-            When the source is not there at the start, the board refuses its configuration, or the log cannot be
-            written; what came is in the log.
-        TextError
-            When the port sends lines of numbers: there is no log then.
+        Raises PvidError when the source is not there at the start, the board refuses its configuration, or the log
+        cannot be written; what came is in the log. Raises TextError when the port sends lines of numbers: there is no
+        log then.
         """
         writer = LogWriter(self.out, rig=self.rig, append=self.append)
         recorder = Recorder(self.source, writer, None if self.samples is None else lambda: self._room(writer))

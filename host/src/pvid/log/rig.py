@@ -34,10 +34,7 @@ _LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
 def settings_text_of_log(path: Path) -> str | None:
     """The rig of a log with the settings of its identifier (board.mechanism_board); None: the log has none.
 
-    Raises
-    ------
-    PvidError
-        When the log cannot be read.
+    Raises PvidError when the log cannot be read.
     """
     text = _text_of_log(path)
     return text if text is not None and is_settings_text(text) else None
@@ -62,10 +59,7 @@ def is_settings_text(text: str) -> bool:
 def document_of_log(path: Path) -> dict[str, Any] | None:
     """The tables of the rig in a log, without the identifier's; None: the log has none.
 
-    Raises
-    ------
-    PvidError
-        When the log cannot be read, or the rig file in it is none.
+    Raises PvidError when the log cannot be read, or the rig file in it is none.
     """
     text = _text_of_log(path)
     if text is None:
@@ -77,10 +71,7 @@ def mechanism_of_log(path: Path, rig_path: Path | None = None) -> LogMechanism:
     """The mechanism of a log: that of its rig, or of a rig file, with the constants in it, else the first one that the
     board named; UNNAMED if none did.
 
-    Raises
-    ------
-    PvidError
-        When the log or the rig file cannot be read, or is none.
+    Raises PvidError when the log or the rig file cannot be read, or is none.
     """
     text = _text_of_log(path)
     logged = {} if text is None else toml_document(text)
@@ -129,10 +120,7 @@ def names_of_log(path: Path) -> BoardNames | None:
 def refuse_to_append(path: Path, rig: str | None) -> None:
     """A log has one rig file, `rig`: verify, identify and export take it for all of its segments.
 
-    Raises
-    ------
-    PvidError
-        When `path` is there and is no log, or one with another rig file.
+    Raises PvidError when `path` is there and is no log, or one with another rig file.
     """
     stream = LogStream()
     try:
@@ -172,10 +160,7 @@ def _read(path: Path, columns: Columns) -> Recording:
 def recording_of_log(path: Path, names: Sequence[str]) -> Recording:
     """The longest stretch of a log of a described mechanism without a gap, of the signals of these names.
 
-    Raises
-    ------
-    PvidError
-        When the log cannot be read, the board's sample rate is unknown, it has other samples or too few.
+    Raises PvidError when the log cannot be read, the board's sample rate is unknown, it has other samples or too few.
     """
     mechanism = mechanism_of_log(path)
     named = [one.name for one in mechanism.samples]

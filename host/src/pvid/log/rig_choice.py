@@ -40,6 +40,10 @@ def rig_of(
 ) -> MechanismRig:
     """The rig of a recording.
 
+    Raises PvidError where the file cannot be read, a key or a value is wrong, a constant that differs from rig to rig
+    has no value, no mechanism is named and none or several have the signals of the recording, or a log or rig file
+    names a model file that `model` does not name: what they name is never run.
+
     Parameters
     ----------
     run_path, rig_path : a log has its own rig, a run may have a rig file beside it; the other one comes before both
@@ -47,13 +51,6 @@ def rig_of(
     model : name, model file or model of this call, before both
     columns : the text of --columns
     read : reads the recording, where it is no file
-
-    Raises
-    ------
-    PvidError
-        Where the file cannot be read, a key or a value is wrong, a constant that differs from rig to rig has no value,
-        no mechanism is named and none or several have the signals of the recording, or a log or rig file names a model
-        file that `model` does not name: what they name is never run.
     """
     asked = None if model is None else asked_for(model)
     where = "this recording" if rig_path is None else str(rig_path)
@@ -84,10 +81,7 @@ def common_rig(
 ) -> MechanismRig:
     """The rig of recordings of one mechanism; see `rig_of`.
 
-    Raises
-    ------
-    PvidError
-        Also where their rig files differ; a recording without one has that of the first.
+    Raises PvidError also where their rig files differ; a recording without one has that of the first.
     """
     first, *others = run_paths
     rig = rig_of(first, rig_path, settings, model, columns)
@@ -116,11 +110,8 @@ def _document(run_path: Path | None, rig_path: Path | None, asked: Mechanism | N
 def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, columns: str | None) -> str:
     """The shipped mechanism whose signals a recording has, or that a board named.
 
-    Raises
-    ------
-    PvidError
-        Where none has, or several have. One whose signals are a part of another's is not counted: a file with the
-        columns of a driven motor is of that, not of a motor that runs out.
+    Raises PvidError where none has, or several have. One whose signals are a part of another's is not counted: a file
+    with the columns of a driven motor is of that, not of a motor that runs out.
     """
     if run_path is not None and run_path.suffix == LOG_SUFFIX:
         return mechanism_of_log(run_path).name

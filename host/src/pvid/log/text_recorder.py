@@ -59,11 +59,8 @@ class TextRecorder:
     def run(self) -> TextTable:
         """Until SIGINT, SIGTERM, the duration or the samples; in the main thread.
 
-        Raises
-        ------
-        PvidError
-            When the port is not there at the start, a file of the name exists or cannot be written, or the port sends
-            frames: there is no file then.
+        Raises PvidError when the port is not there at the start, a file of the name exists or cannot be written, or the
+        port sends frames: there is no file then.
         """
         with contextlib.ExitStack() as files:
             rows, raw = (self._made(path, files) for path in (self.out, self.raw))

@@ -144,14 +144,10 @@ class Values:
 
     Parameters
     ----------
-    mechanism
-        Of the rig; without its constants no outputs are computed.
-    hello
-        Who the board is, where that is known before its records; without it times are NaN until it has said so.
-    follows
-        Take the mechanism that the board names, from there on; the tables change with it.
-    refined
-        Refined parameters of the log's boards; None: those that the board names, from there on.
+    mechanism : of the rig; without its constants no outputs are computed
+    hello : who the board is, where that is known before its records; without it times are NaN until it has said so
+    follows : take the mechanism that the board names, from there on; the tables change with it
+    refined : refined parameters of the log's boards; None: those that the board names, from there on
     """
 
     def __init__(

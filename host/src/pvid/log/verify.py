@@ -226,12 +226,9 @@ class Verifier:
 
     Parameters
     ----------
-    board
-        What sent the log; None: nothing can be verified.
-    progress
-        Called with the number of ticks computed so far.
-    twin_alone
-        The twin computes everything, and the core nothing.
+    board : what sent the log; None: nothing can be verified
+    progress : called with the number of ticks computed so far
+    twin_alone : the twin computes everything, and the core nothing
 
     Memory: the samples of the longest stretch.
     """

@@ -38,18 +38,15 @@ class Signal:
     noise : standard deviation of its white noise, in resolutions (in its unit where resolution is 0)
     reach : largest absolute value
     hold : "zoh": the value set at t_k holds until t_(k+1); "sampled": the value at t_k
-    edge
-        of a sensor that jumps with a held input: its sample is that "before" the jump at its instant or "after" it;
+    edge : of a sensor that jumps with a held input: its sample is that "before" the jump at its instant or "after" it;
         "between": halfway, or not known
     smooth : what a held input is set to never jumps: the refinement in C may take steps of several samples
     driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
     gain_sd : relative standard deviation of its gain; part of the standard errors, because a run seldom shows it
-    delay_sd, offset_sd
-        standard deviations of its delay [s] and offset [unit] in a design that no recording is for; None: a tenth of
-        the time between samples; half a sensor's resolution, a thousandth of an input's reach
-    neglected
-        the equations are linearised: their relative error is up to this many times the square of the signal, from its
-        mean; part of the standard errors [1/unit^2]
+    delay_sd, offset_sd : standard deviations of its delay [s] and offset [unit] in a design that no recording is for;
+        None: a tenth of the time between samples; half a sensor's resolution, a thousandth of an input's reach
+    neglected : the equations are linearised: their relative error is up to this many times the square of the signal,
+        from its mean; part of the standard errors [1/unit^2]
     delay : its samples are taken so much later than those of the others [s]
     given : the rig file states the resolution; else it may be taken from a recording
     """
@@ -281,10 +278,9 @@ class CompiledModel:
     name, title : as in commands; in a few words
     signals, unknowns, knowns, outputs : as described
     rows : their kinds, in the order of the equations
-    opaque
-        jet of an auxiliary signal -> the expression that it is computed from: a definition of the description (y''/l1,
-        or Integral(i, 1), since the start of the run); in a strong form also sgn(th'), which is differentiated there.
-        The rows contain its jets like those of a signal.
+    opaque : jet of an auxiliary signal -> the expression that it is computed from: a definition of the description
+        (y''/l1, or Integral(i, 1), since the start of the run); in a strong form also sgn(th'), which is differentiated
+        there. The rows contain its jets like those of a signal.
     equations : expressions = 0 as the user wrote them (in jets of signals and hidden), for the simulator
     hidden : unmeasured coordinates, and defined integrals, whose rates are among the equations
     refinement : of the second stage

@@ -91,12 +91,10 @@ class Model:
         noise : standard deviation of its white noise, in resolutions (0.5); in its unit where there is no resolution
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
-        gain_sd
-            relative standard deviation of its gain, which most runs do not show; 0.01 if it is driven, else 0.005,
-            and 0 of an angle, as an encoder has a whole number of counts a turn
-        neglected
-            of equations for small values: relative error over the square of the signal, from its mean [1/unit^2]; part
-            of the standard errors
+        gain_sd : relative standard deviation of its gain, which most runs do not show; 0.01 if it is driven, else
+            0.005, and 0 of an angle, as an encoder has a whole number of counts a turn
+        neglected : of equations for small values: relative error over the square of the signal, from its mean
+            [1/unit^2]; part of the standard errors
         """
         if resolution < 0 or not math.isfinite(resolution):
             raise self._refused(f"{name}: resolution must not be negative")
@@ -194,9 +192,8 @@ class Model:
         ----------
         guess : rough value [unit], a number or what it follows from in known constants, as in 9.8 / l1
         positive : it cannot be 0 or below
-        low, high
-            range of the plausible [unit], which the search does not leave where given; else a hundredth and a hundred
-            times the guess, or 10 sd around it, with a warning beyond
+        low, high : range of the plausible [unit], which the search does not leave where given; else a hundredth and a
+            hundred times the guess, or 10 sd around it, with a warning beyond
         sd : how far off the guess can be [unit]; 2 |guess|
         """
         guess_of = guess if isinstance(guess, sp.Expr) and guess.free_symbols else None
@@ -275,9 +272,9 @@ class Model:
 
         Parameters
         ----------
-        rates
-            unknown -> its change by one unit of what drifts, in unknowns and known constants: {R: alpha*R, k: -beta*k}.
-            An unknown in no equation may be among them, as the temperature's rise: it begins at its guess, within sd.
+        rates : unknown -> its change by one unit of what drifts, in unknowns and known constants:
+            {R: alpha*R, k: -beta*k}. An unknown in no equation may be among them, as the temperature's rise: it begins
+            at its guess, within sd.
         memory_s : time constant of what the rows tell along it [s], as short as the noise allows; one for all drifts
         """
         title = f"drift {len(self.drifts) + 1}"
@@ -302,17 +299,13 @@ class Model:
     def add(self, text: str, guess: float = 0.0, sd: float = 1.0) -> None:
         """Adds a term with one new unknown, or changes a signal by it.
 
+        Raises ModelError naming what is wrong with it.
+
         Parameters
         ----------
-        text
-            "drop*sgn(i)": a term of the only equation; "equation 1: drop*sgn(i)": of the equation with this name;
+        text : "drop*sgn(i)": a term of the only equation; "equation 1: drop*sgn(i)": of the equation with this name;
             "V: V + drop*sgn(V)": what the signal V is in place of what was recorded. The unknown is linear in it.
         guess, sd : of the unknown [its unit, which follows from the equation where it can]
-
-        Raises
-        ------
-        ModelError
-            Naming what is wrong with it.
         """
         where, _, expression = text.rpartition(":")
         parsed = typed_expression(expression, self._names())
@@ -443,13 +436,7 @@ class Model:
     # ---- result
 
     def compiled(self, name: str = "") -> CompiledModel:
-        """Rows, theta and the rest.
-
-        Raises
-        ------
-        ModelError
-            Where it cannot be done, with the cause.
-        """
+        """Rows, theta and the rest. Raises ModelError where it cannot be done, with the cause."""
         return self._compiled(name, "")
 
     def compiled_variants(self, name: str = "") -> dict[str, CompiledModel]:

@@ -71,10 +71,7 @@ class Reduced:
 def eliminate(equations: Sequence[Equation], hidden: Sequence[str], p: Collection[sp.Symbol]) -> list[Reduced]:
     """All equations in measured signals that follow.
 
-    Raises
-    ------
-    ModelError
-        Where a coordinate remains; the sentence names it, the term and what would help.
+    Raises ModelError where a coordinate remains; the sentence names it, the term and what would help.
     """
     out = [Reduced(one.name, one.expression, place=one.place) for one in equations if not _has(one, hidden)]
     left = [one for one in equations if _has(one, hidden)]

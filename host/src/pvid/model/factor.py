@@ -37,10 +37,7 @@ _Table = dict[_Channel, dict[sp.Expr, sp.Expr]]
 def factor(name: str, parts: Part, p: Sequence[sp.Symbol], nuisances: Sequence[Part] = ()) -> Row:
     """sum_j theta_j N_j = Y of sum of D^m[psi_m] = 0; Y is empty where every term has an unknown.
 
-    Raises
-    ------
-    ModelError
-        Where no term has an unknown.
+    Raises ModelError where no term has an unknown.
     """
     table = _table(parts, p)
     table = _independent(table, [_Channel(m, base) for part in nuisances for m, base in part.items()])

@@ -23,15 +23,12 @@ def lower(expression: sp.Expr, by_parts: str = "") -> dict[int, sp.Expr]:
     by one, become D[F]; F and the remainder are treated likewise. What is neither stays: a channel of order 0 with a
     smoothed derivative.
 
+    Raises ModelError where the derivative of sgn(..) or |..| would be needed in a product.
+
     Parameters
     ----------
     expression : without unknowns
     by_parts : a signal; its derivative is moved even where a derivative of another signal takes its place
-
-    Raises
-    ------
-    ModelError
-        Where the derivative of sgn(..) or |..| would be needed in a product.
     """
     direct: dict[int, sp.Expr] = {}
     smooth = []

@@ -15,15 +15,12 @@ from pvid.model.signals import total_derivative
 def equations_of(method: Any, signals: Mapping[Any, sp.Expr]) -> list[sp.Expr]:
     """Expressions = 0 of a LagrangesMethod, KanesMethod or System, its dynamicsymbols replaced.
 
+    Raises ModelError where something has no counterpart in the model.
+
     Parameters
     ----------
     method : Kane's and Lagrange's equations are formed where they are not yet
     signals : dynamicsymbol (coordinates, inputs; speeds follow) or constant -> what the model has for it
-
-    Raises
-    ------
-    ModelError
-        Where something has no counterpart in the model.
     """
     if isinstance(method, System):
         if method.eom_method is None:

@@ -26,10 +26,8 @@ _WITHOUT = {
 def rational(expression: sp.Expr) -> sp.Expr:
     """Floats as the decimal fractions that they are written as.
 
-    Raises
-    ------
-    ModelError
-        Where a number is infinite or undefined, or a function is one of SymPy's that abs and sgn do without.
+    Raises ModelError where a number is infinite or undefined, or a function is one of SymPy's that abs and sgn do
+    without.
     """
     whole = sp.sympify(expression)
     if whole.has(sp.zoo, sp.nan, sp.oo, -sp.oo):
@@ -42,10 +40,7 @@ def rational(expression: sp.Expr) -> sp.Expr:
 def normal_form(expression: sp.Expr, p: Collection[sp.Symbol]) -> sp.Expr:
     """Expanded; multiplied, where needed, by a common denominator.
 
-    Raises
-    ------
-    ModelError
-        Where a function or a power is none that rows can be made of.
+    Raises ModelError where a function or a power is none that rows can be made of.
     """
     whole = rational(expression)
     whole = whole.replace(sp.sign, sgn).replace(sp.tan, lambda x: sp.sin(x) / sp.cos(x))

@@ -25,10 +25,7 @@ class Opaque:
     def hide(self, expression: sp.Expr) -> sp.Expr:
         """Each term's factor of measured signals that contains sgn, |..| or a root becomes one jet.
 
-        Raises
-        ------
-        ModelError
-            Where one of these takes a coordinate that is not measured.
+        Raises ModelError where one of these takes a coordinate that is not measured.
         """
         return added(self._term(term) for term in terms_of(expression))
 

@@ -133,21 +133,15 @@ def program_of(
 ) -> Program:
     """The operations that compute the expressions.
 
+    Raises PvidError for a symbol that is no argument, and for a function other than sin, cos, tan, sgn, abs and sqrt.
+
     Parameters
     ----------
-    arguments
-        What is given: symbols, and other expressions that are inputs as a whole (an integral).
-    expressions
-        What is computed, in this order.
-    names
-        Of the arguments; their text by default.
-    widths
-        Argument of a sgn, as text -> width of the soft sign v / (|v| + width) in its place; a plain sign without one.
-
-    Raises
-    ------
-    PvidError
-        For a symbol that is no argument, and for a function other than sin, cos, tan, sgn, abs and sqrt.
+    arguments : what is given: symbols, and other expressions that are inputs as a whole (an integral)
+    expressions : what is computed, in this order
+    names : of the arguments; their text by default
+    widths : argument of a sgn, as text -> width of the soft sign v / (|v| + width) in its place; a plain sign without
+        one
     """
     builder = Builder(arguments, widths or {})
     results = tuple(builder.place_of(sp.sympify(one)) for one in expressions)

@@ -53,9 +53,8 @@ class Robot(Model):
         origin, rpy : of the body's frame at q = 0 in that of its parent, as in URDF [m], [rad]
         parent : joint that carries this one, or "base"; the one before by default
         prismatic : it slides along the axis
-        inertial
-            m, hx, hy, hz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of the file [kg, kg*m, kg*m^2]: h is m times the centre, I about
-            the frame's origin; they are what the answer is compared with
+        inertial : m, hx, hy, hz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of the file [kg, kg*m, kg*m^2]: h is m times the centre,
+            I about the frame's origin; they are what the answer is compared with
         rotor : inertia of the motor's rotor at the joint, gear included [kg*m^2]; None: it has none
         offset : the recorded torque has a constant offset, which is identified
         torque_constant : torque at the joint per ampere [N*m/A]: a current i1 is recorded

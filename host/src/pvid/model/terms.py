@@ -49,10 +49,7 @@ def is_opaque(expression: sp.Expr) -> bool:
 def split(term: sp.Expr, p: Iterable[sp.Symbol]) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     """A term as (constant without unknowns, function of the unknowns, function of signals and time).
 
-    Raises
-    ------
-    ModelError
-        Where a factor contains an unknown and a signal.
+    Raises ModelError where a factor contains an unknown and a signal.
     """
     unknowns = set(p)
     constant: list[sp.Expr] = []

@@ -24,14 +24,11 @@ _OPERATORS: dict[type, Any] = {
 def typed_expression(text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     """Of numbers, names, + - * / **, `x.d()` and sgn, sin, cos, abs, exp, sqrt; nothing else is run.
 
+    Raises ModelError naming what is none of these.
+
     Parameters
     ----------
     names : signals and symbols by name; another name is a new real symbol
-
-    Raises
-    ------
-    ModelError
-        Naming what is none of these.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval")

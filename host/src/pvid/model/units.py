@@ -84,10 +84,7 @@ PER_SECOND = Dimension(tuple(sp.Integer(-1 if name == "s" else 0) for name in _B
 def dimension_of_unit(text: str) -> Dimension:
     """Of a unit such as "N*m/A", "1/s^2" or "".
 
-    Raises
-    ------
-    ModelError
-        Where the text is no unit, or not one of the coherent units of SI.
+    Raises ModelError where the text is no unit, or not one of the coherent units of SI.
     """
     if not text.strip():
         return NUMBER
@@ -105,10 +102,7 @@ def dimension_of_unit(text: str) -> Dimension:
 def dimension_of(expression: sp.Expr, of: Mapping[str, Dimension]) -> Dimension | None:
     """Of an expression; None of 0. `of` contains signals and symbols by name.
 
-    Raises
-    ------
-    ModelError
-        Where terms of a sum, or the argument of a sine, have the wrong unit.
+    Raises ModelError where terms of a sum, or the argument of a sine, have the wrong unit.
     """
     if expression == 0:
         return None

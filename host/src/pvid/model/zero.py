@@ -118,10 +118,7 @@ class Sampler:
     def at_random(self, source: random.Random) -> list[Fraction]:
         """Values at a new point, at which nothing is divided by 0.
 
-        Raises
-        ------
-        ModelError
-            Where a denominator is always 0.
+        Raises ModelError where a denominator is always 0.
         """
         for _ in range(_ATTEMPTS):
             try:

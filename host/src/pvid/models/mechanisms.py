@@ -30,10 +30,7 @@ _models: WeakKeyDictionary[Model, tuple[str, CompiledModel]] = WeakKeyDictionary
 def path_of(mechanism: Mechanism) -> tuple[str, Path]:
     """A mechanism's name and file.
 
-    Raises
-    ------
-    PvidError
-        Where there is no shipped mechanism of the name, no such model file, or the mechanism is a model.
+    Raises PvidError where there is no shipped mechanism of the name, no such model file, or the mechanism is a model.
     """
     if isinstance(mechanism, str):
         return shipped(mechanism), _FOLDER / mechanism / DESCRIPTION
@@ -47,10 +44,7 @@ def path_of(mechanism: Mechanism) -> tuple[str, Path]:
 def described(mechanism: Mechanism) -> Model:
     """The description in a model file, which may import Python files that lie beside it.
 
-    Raises
-    ------
-    PvidError
-        Where the file cannot be read or run, or leaves no model; the sentence contains the line.
+    Raises PvidError where the file cannot be read or run, or leaves no model; the sentence contains the line.
     """
     path = path_of(mechanism)[1]
     return _left_in(_space_of(path), path)[1]
@@ -74,10 +68,7 @@ def unused_input(mechanism: str, columns: Collection[str]) -> str:
 def text_with(mechanism: Mechanism, lines: Sequence[str]) -> str:
     """A model file's text with more calls of its model, each as in "add('a*sgn(v)')".
 
-    Raises
-    ------
-    PvidError
-        As `described`.
+    Raises PvidError as `described`.
     """
     path = path_of(mechanism)[1]
     name, _ = _left_in(_space_of(path), path)

@@ -53,14 +53,11 @@ def is_named(asked: Mechanism, name: str) -> bool:
 def shipped(name: str, where: str = "this recording") -> str:
     """The name of a shipped mechanism in a text, which may come from anybody.
 
+    Raises PvidError where it is none. A model file is not looked for: a text must not choose what runs.
+
     Parameters
     ----------
     where : the text, as a sentence names it
-
-    Raises
-    ------
-    PvidError
-        Where it is none. A model file is not looked for: a text must not choose what runs.
     """
     if name in names():
         return name

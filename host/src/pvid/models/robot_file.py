@@ -27,16 +27,13 @@ _TOP, _LEAST_MASS = 80, 1e-9
 def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
     """The text of a model file.
 
+    Raises PvidError where the file cannot be read, or is no robot on a fixed base with known inertias.
+
     Parameters
     ----------
     path : URDF or MJCF
     chosen : names of the joints that move and are recorded, in the order of the columns; others are held at their zero;
         (): all
-
-    Raises
-    ------
-    PvidError
-        Where the file cannot be read, or is no robot on a fixed base with known inertias.
     """
     mujoco, model = _read(path)
     joints = _chosen(mujoco, model, path, chosen)

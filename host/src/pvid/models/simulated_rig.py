@@ -43,9 +43,8 @@ class SimulatedRig:
     sample_rate : [Hz]
     duration : [s]
     substeps : steps of the integration in a sample
-    friction_width
-        speed over which the sign of a soft friction changes, tanh(v / width), in the unit of the sign's argument;
-        0: there is no friction
+    friction_width : speed over which the sign of a soft friction changes, tanh(v / width), in the unit of the sign's
+        argument; 0: there is no friction
     window_s : window of the Cramer-Rao bound and of the design [s]
     design : the rest of a design of the weak form that suits the rig: fields of WeakDesign
     knowns : values that differ from those of the model

@@ -42,8 +42,7 @@ class StrongSettings:
     ----------
     taps, degree : of the polynomial; the degree at least that of the highest derivative
     every : samples from row to row
-    law
-        "stationary": a Gauss-Newton step on all rows so far at every tick; "pseudovelocity": the paper's law alone,
+    law : "stationary": a Gauss-Newton step on all rows so far at every tick; "pseudovelocity": the paper's law alone,
         dp = S^-1 C^T N (Y - N^T theta)
     forgetting_s : time constant [s]; 0: none
     """

@@ -129,6 +129,8 @@ def table_of(
 ) -> Table:
     """The signals among named columns of numbers.
 
+    Raises PvidError where a column is missing or holds something else than numbers, or times for t.
+
     Parameters
     ----------
     path : of the file, or a name for data in memory
@@ -136,11 +138,6 @@ def table_of(
     column : an array-like by name: shape (n,), (n, 1) or (1, n); masked samples, None, NaN and infinities are missing
     columns : the ones that are wanted
     units : of columns by name, as far as the file states them
-
-    Raises
-    ------
-    PvidError
-        Where a column is missing or holds something else than numbers, or times for t.
     """
     places = columns.places(path, names)
     given = {signal: (units or {}).get(names[place], "") for signal, place in places.items()}
@@ -175,10 +172,7 @@ def table_of(
 def numbers_of(path: Path, name: str, data: Any) -> FloatArray:
     """Of an array-like of any kind of real numbers, shape (n,); NaN where one is missing.
 
-    Raises
-    ------
-    PvidError
-        Where it holds something else.
+    Raises PvidError where it holds something else.
     """
     mask = np.ma.getmaskarray(data) if np.ma.isMaskedArray(data) else None
     array = np.asarray(np.ma.getdata(data) if mask is not None else data)

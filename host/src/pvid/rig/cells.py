@@ -128,17 +128,14 @@ def styles(
 ) -> dict[str, Style] | None:
     """Of each column, by what all of them show.
 
+    Raises PvidError where a column can be read in two ways.
+
     Parameters
     ----------
     path : of the file, for a refusal
     found : by name of a column
     whole : whether all cells were counted; else None is returned where more of them might decide otherwise
     separator : of columns; with a semicolon a comma is a decimal sign where other numbers have no thousands separators
-
-    Raises
-    ------
-    PvidError
-        Where a column can be read in two ways.
     """
     sure = {name: _sure(path, name, one, whole) for name, one in found.items()}
     if not whole and any(one.either[","] and sure[name] is None for name, one in found.items()):

@@ -95,17 +95,12 @@ class Uniform:
 def uniform(table: Table, promised: float | None) -> Uniform:
     """Samples of a table on a uniform clock.
 
+    Raises PvidError when time runs backwards, more is missing than there, or t and the promise contradict each other.
+
     Parameters
     ----------
-    table
-        At least 3 rows; t is finite.
-    promised
-        The rig file's sample rate [Hz].
-
-    Raises
-    ------
-    PvidError
-        When time runs backwards, more is missing than there, or t and the promise contradict each other.
+    table : at least 3 rows; t is finite
+    promised : the rig file's sample rate [Hz]
     """
     t = table.t
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # times near the end of float64's range

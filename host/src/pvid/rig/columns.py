@@ -128,10 +128,7 @@ class Columns:
         units. A minus sign in front of it turns the sign, `/N` behind it divides: `rev/4096` for counts of an encoder,
         `-mm` for a height that grows downwards.
 
-        Raises
-        ------
-        PvidError
-            When the text is none, naming the part.
+        Raises PvidError when the text is none, naming the part.
         """
         named: dict[str, Column] = {}
         units = cls(channels).units
@@ -180,10 +177,8 @@ class Columns:
     def places(self, path: Path, names: Sequence[str], where: str = "") -> dict[str, int]:
         """Index of each signal's column among the names of a file's columns.
 
-        Raises
-        ------
-        PvidError
-            When a column is missing or appears twice; the sentence lists the file's columns and how to name them.
+        Raises PvidError when a column is missing or appears twice; the sentence lists the file's columns and how to
+        name them.
         """
         places = {}
         for signal in self.units:

@@ -61,13 +61,7 @@ class _OtherStyleError(Exception):
 
 
 def read_csv(path: Path, columns: Columns) -> Table:
-    """Reads a table, gzip if its name ends in .gz.
-
-    Raises
-    ------
-    PvidError
-        For whatever is wrong with the file.
-    """
+    """Reads a table, gzip if its name ends in .gz. Raises PvidError for whatever is wrong with the file."""
     return text_table(path, columns, lambda: blocks(path))
 
 

@@ -22,10 +22,7 @@ _WHITE = str.maketrans("\t\r\n", "   ")
 def read_excel(path: Path, columns: Columns) -> Table:
     """Reads the first sheet that has the columns.
 
-    Raises
-    ------
-    PvidError
-        For whatever is wrong with the file, in its first sheet where none has the columns.
+    Raises PvidError for whatever is wrong with the file, in its first sheet where none has the columns.
     """
     try:
         import openpyxl

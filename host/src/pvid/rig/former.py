@@ -33,10 +33,7 @@ def names_of_former_board() -> str:
 def translated(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     """The tables of a file with the keys of today; `name`: of its mechanism.
 
-    Raises
-    ------
-    PvidError
-        Naming a key that has no place any more, with what to do.
+    Raises PvidError naming a key that has no place any more, with what to do.
     """
     out: dict[str, Any] = copied(document)
     former = _former_of(name)

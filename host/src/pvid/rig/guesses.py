@@ -25,15 +25,12 @@ _WIDEST = 10.0  # of a logarithm: a factor of 22 000
 def unknowns_of(model: CompiledModel, outputs: Mapping[str, float], fixed: Collection[str]) -> tuple[Unknown, ...]:
     """The unknowns of a model with the guesses nearest to theirs at which its outputs have these values.
 
+    Raises PvidError where no values of the unknowns give these outputs.
+
     Parameters
     ----------
     outputs : by name
     fixed : unknowns whose guesses stay
-
-    Raises
-    ------
-    PvidError
-        Where no values of the unknowns give these outputs.
     """
     wanted = np.array([*outputs.values()])
     expressions = [model.with_knowns(one.value) for name in outputs for one in model.outputs if one.name == name]

@@ -76,8 +76,7 @@ class MechanismRig:
 
     Attributes
     ----------
-    model
-        name of a shipped mechanism, or the path of a model file or the model that this call named
+    model : name of a shipped mechanism, or the path of a model file or the model that this call named
         (pvid.models.registry)
     sample_rate : [Hz]; None: that of the run
     known, known_sd : values of the model's constants, and standard deviations of them
@@ -105,10 +104,7 @@ class MechanismRig:
     def parse(cls, text: str) -> MechanismRig:
         """From TOML text.
 
-        Raises
-        ------
-        PvidError
-            Naming the key that is no key of such a file, or whose value is no number.
+        Raises PvidError naming the key that is no key of such a file, or whose value is no number.
         """
         return cls.of_document(toml_document(text))
 
@@ -166,10 +162,8 @@ class MechanismRig:
     def applied(self, model: CompiledModel) -> CompiledModel:
         """The model with the values of this rig.
 
-        Raises
-        ------
-        PvidError
-            Naming a constant, signal, unknown or option that the model does not have, or a guess that it excludes.
+        Raises PvidError naming a constant, signal, unknown or option that the model does not have, or a guess that it
+        excludes.
         """
         _refuse_unknown("known", self.known, [one.name for one in model.knowns])
         _refuse_unknown("sensor", self.sensor, [one.name for one in model.signals])
@@ -292,10 +286,7 @@ def channels_of(model: CompiledModel | Description) -> tuple[Channel, ...]:
 def with_settings(document: Mapping[str, Any], settings: Iterable[str]) -> dict[str, Any]:
     """The tables of a rig file with `KEY=VALUE` in place of its own: known.g=9.7, sensor.phi.resolution=1e-3.
 
-    Raises
-    ------
-    PvidError
-        Where a setting is none.
+    Raises PvidError where a setting is none.
     """
     changed = copied(document)
     for setting in settings:

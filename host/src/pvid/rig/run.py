@@ -109,10 +109,7 @@ class Recording:
     def refuse_damaged(self) -> None:
         """Refuses numbers that no unit explains, and that overflow what is computed with them.
 
-        Raises
-        ------
-        PvidError
-            Naming the first.
+        Raises PvidError naming the first.
         """
         for name, values in self.signals.items():
             beyond = np.abs(values) > _LARGEST
@@ -132,10 +129,7 @@ class Recording:
     def whole(self) -> Recording:
         """The longest stretch without a missing tick, for what cannot leave ticks out; itself when none is missing.
 
-        Raises
-        ------
-        PvidError
-            When no stretch has `MIN_ROWS` samples.
+        Raises PvidError when no stretch has `MIN_ROWS` samples.
         """
         there = np.logical_and.reduce([np.isfinite(one) for one in self.signals.values()])
         if there.all():
@@ -154,6 +148,8 @@ class Recording:
 def read_recording(path: str | os.PathLike[str], rate: float | None, columns: Columns) -> Recording:
     """Read a text table of any suffix, ``.npz``, ``.parquet``, ``.arrow``, ``.mat``, ``.h5``, ``.xlsx`` or ``.mcap``.
 
+    Raises PvidError for anything that is wrong with the file and cannot be bridged.
+
     Parameters
     ----------
     path : path
@@ -161,11 +157,6 @@ def read_recording(path: str | os.PathLike[str], rate: float | None, columns: Co
         The sample rate the rig file promises [Hz].
     columns : Columns
         Which columns are t and the signals, and their units.
-
-    Raises
-    ------
-    PvidError
-        For anything that is wrong with the file and cannot be bridged.
     """
     if rate is not None and not 0 < rate < float("inf"):
         raise PvidError(f"The sample rate must be a positive number of Hz, not {rate:g}.")
@@ -198,16 +189,13 @@ def recording_of_arrays(
 ) -> Recording:
     """A recording of arrays by name, with the checks and corrections that a file gets.
 
+    Raises PvidError for anything that is wrong with the data and cannot be bridged.
+
     Parameters
     ----------
     named : of each column an array-like, shape (n,)
     rate, columns : see `read_recording`
     name : of the data, in a refusal
-
-    Raises
-    ------
-    PvidError
-        For anything that is wrong with the data and cannot be bridged.
     """
     names = [str(one) for one in named]
     arrays = dict(zip(names, named.values(), strict=True))
@@ -219,10 +207,7 @@ def write_recording(path: str | os.PathLike[str], recording: Recording, channels
 
     The file appears whole or not at all (temporary file, then rename), and the same recording gives the same bytes.
 
-    Raises
-    ------
-    PvidError
-        When `read_recording` would not give it back, or the file cannot be written.
+    Raises PvidError when `read_recording` would not give it back, or the file cannot be written.
     """
     path = Path(path)
     write = _format(path, _WRITERS)

@@ -55,8 +55,7 @@ def resolution_of(values: npt.ArrayLike) -> float | None:
 
     Parameters
     ----------
-    values
-        As recorded, with any offset [n]; NaN and infinities are left out.
+    values : as recorded, with any offset [n]; NaN and infinities are left out
 
     Returns
     -------

@@ -31,13 +31,7 @@ def most_rows() -> int:
 
 
 def refuse_beyond(path: Path, rows: int) -> None:
-    """Refuses a file of more rows.
-
-    Raises
-    ------
-    PvidError
-        Naming the limit.
-    """
+    """Refuses a file of more rows. Raises PvidError naming the limit."""
     most = most_rows()
     if rows > most:
         why = "no run is that long" if most == MOST_ROWS else "this machine has memory for no more"

@@ -31,10 +31,7 @@ _CONTROL = re.compile(rb"[\0-\x06\x0e-\x1a\x1c-\x1f]")
 def blocks(path: Path) -> Iterator[bytes]:
     """The text in blocks of whole lines, each line ended by one newline but perhaps the last.
 
-    Raises
-    ------
-    PvidError
-        Where the file is no text, or a gzip file that is not whole.
+    Raises PvidError where the file is no text, or a gzip file that is not whole.
     """
     try:
         with path.open("rb") as plain:

@@ -103,10 +103,7 @@ class TimesOfDay:
     def unwrapped(self, t: FloatArray) -> FloatArray:
         """All times [n], when all are read: those past midnight are of the next day.
 
-        Raises
-        ------
-        PvidError
-            When the dates can be read in two ways.
+        Raises PvidError when the dates can be read in two ways.
         """
         if self._either and len(self._days) > 1 and len(self._orders) != 1:
             raise PvidError(f"dates such as {self._either} can be read in two ways, and the run lasts over midnight")

@@ -28,10 +28,7 @@ _APART = 64
 def names_of(paths: Sequence[Path]) -> tuple[str, ...]:
     """A short name for each file: its stem, with the folder in front where two have the same one.
 
-    Raises
-    ------
-    PvidError
-        Where a file is given twice.
+    Raises PvidError where a file is given twice.
     """
     twice = [one for one, times in Counter(path.resolve() for path in paths).items() if times > 1]
     if twice:
@@ -50,15 +47,12 @@ def joined(recordings: Sequence[Recording], names: Sequence[str], columns: Colum
 
     The times of the second and the others follow those before them.
 
+    Raises PvidError where a sample rate is another one than that of the first.
+
     Parameters
     ----------
     names : of each, in notes and answers
     columns : which signals are held
-
-    Raises
-    ------
-    PvidError
-        Where a sample rate is another one than that of the first.
     """
     first, *others = recordings
     if not others:

@@ -58,12 +58,11 @@ class RefineConfig:
     outlier_gate : means of samples that stand out by more than this multiple of the usual are left out; 0: no gate
     gate, chi_max, clash_max, step_max, step_limit, se_max, distance : limits
     step_fine : with signs step_max behind the second block; None: there are none
-    parts, fine_parts
-        steps of Runge-Kutta in a step of the motion, in one in which a sign may change; None: steps are Adams's
+    parts, fine_parts : steps of Runge-Kutta in a step of the motion, in one in which a sign may change; None: steps are
+        Adams's
     width : where the widths of the signs start [widths]; None: none is refined
-    observer
-        correction of the states at the end of a big step by a row of each output, flat [outputs, states]; None: no
-        input is measured, or steps are Adams's
+    observer : correction of the states at the end of a big step by a row of each output, flat [outputs, states]; None:
+        no input is measured, or steps are Adams's
     """
 
     sample_rate: float

@@ -47,14 +47,11 @@ def write_figure(answer: Answer, path: Path, title: str = "") -> None:
     """Writes measured against predicted motion that was not fitted, where it was simulated, and below it the estimates
     over time with the answer and its 95 % interval. png, svg or pdf by suffix.
 
+    Raises PvidError when it cannot be written.
+
     Parameters
     ----------
     answer : whose values and errors are drawn
-
-    Raises
-    ------
-    PvidError
-        When it cannot be written.
     """
     unseen = answer.unseen
     heights = [] if unseen is None else [height_of(unseen)]

@@ -22,10 +22,7 @@ _PANELS = 16  # the first columns
 def write_columns_figure(survey: Survey, path: Path) -> None:
     """Draws each column of numbers in the unit of the file; png, svg or pdf by suffix.
 
-    Raises
-    ------
-    PvidError
-        When it cannot be written.
+    Raises PvidError when it cannot be written.
     """
     recording = survey.recording
     moving = [one for one in survey.facts if one.low < one.high][:_PANELS]

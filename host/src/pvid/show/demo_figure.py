@@ -34,15 +34,12 @@ def convergence(
 ) -> None:
     """Writes every published estimate with +-2 of its standard errors; png, svg or pdf by suffix.
 
+    Raises PvidError when it cannot be written.
+
     Parameters
     ----------
     weak, refined : the first stage, and both
     truth, names : values by name; those that are shown
-
-    Raises
-    ------
-    PvidError
-        When it cannot be written.
     """
     t, values, errors = published(weak, refined, names)
     columns = 2 if len(names) > _IN_A_COLUMN else 1

@@ -37,10 +37,7 @@ _POINTS = 2000  # half of the most estimates that are drawn
 def write_log_figure(log: Path, mechanism: LogMechanism, path: Path) -> bool:
     """Draws it; the format follows the suffix of `path` (png, svg, pdf). False: the log has no estimate to draw.
 
-    Raises
-    ------
-    PvidError
-        When the log cannot be read, or the file cannot be written.
+    Raises PvidError when the log cannot be read, or the file cannot be written.
     """
     history, reader = History(mechanism, points=_POINTS), LogReader(log)
     history.know(mechanism)  # whatever the board says later

@@ -17,10 +17,7 @@ from pvid.show.report import report
 def report_of_log(log: Path) -> str:
     """The page, of a mechanism that the log names.
 
-    Raises
-    ------
-    PvidError
-        Where the log cannot be read, names a model file, or has too few samples.
+    Raises PvidError where the log cannot be read, names a model file, or has too few samples.
     """
     rig = rig_of(log)
     recording, model = read_all(rig, [source_of(log)], (), None)

@@ -44,10 +44,7 @@ _POLICY = (
 def listen(at: str) -> tuple[socket.socket, str]:
     """A listening socket at HOST:PORT and the address of its page; port 0 is any that is free.
 
-    Raises
-    ------
-    PvidError
-        When it is no HOST:PORT, or cannot be listened to.
+    Raises PvidError when it is no HOST:PORT, or cannot be listened to.
     """
     match = re.fullmatch(r"(\[[0-9A-Fa-f:.]+\]|[^\[\]:/\s]+):(\d{1,5})", at)
     if match is None or int(match[2]) > 65535:
@@ -73,10 +70,7 @@ def is_local(address: str) -> bool:
 def page(at: str, log: Path, title: str) -> Iterator[str]:
     """Serves the live page of a log while the context lasts; yields its address.
 
-    Raises
-    ------
-    PvidError
-        As `listen`, and when the packages of the extra `page` are not installed.
+    Raises PvidError as `listen`, and when the packages of the extra `page` are not installed.
     """
     lacking = [name for name in ("starlette", "uvicorn") if importlib.util.find_spec(name) is None]
     if lacking:

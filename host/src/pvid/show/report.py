@@ -47,13 +47,7 @@ _ONCE = "--columns"  # of a command line: the last one counts
 def write_report(
     answer: Answer, made: Made, path: Path, *, validation: Validation | None = None, name: str = "", more: str = ""
 ) -> None:
-    """Writes `report` to a file.
-
-    Raises
-    ------
-    PvidError
-        Where it cannot be written, or is a file that pvid did not write.
-    """
+    """Writes `report` to a file. Raises PvidError where it cannot be written, or is a file that pvid did not write."""
     page = report(answer, made, validation=validation, name=name, more=more)
     try:
         write_whole(path, page)

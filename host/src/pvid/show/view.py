@@ -45,12 +45,9 @@ class LiveView:
 
     Parameters
     ----------
-    title
-        What is recorded where.
-    mechanism
-        Of the rig; without its constants no outputs are shown.
-    page
-        Address of the live page; empty: none.
+    title : what is recorded where
+    mechanism : of the rig; without its constants no outputs are shown
+    page : address of the live page; empty: none
     """
 
     def __init__(self, console: Console, title: str, mechanism: LogMechanism = UNNAMED, page: str = "") -> None:

@@ -23,10 +23,8 @@ def bound(simulation: RigSimulation, window_s: float | None = None, windows: int
 
     Parameters
     ----------
-    window_s
-        Length of the windows [s]; the rig's own by default.
-    windows
-        How many of the run's first ones; all by default.
+    window_s : length of the windows [s]; the rig's own by default
+    windows : how many of the run's first ones; all by default
     """
     information = information_of(simulation, window_s, windows)
     size = np.sqrt(np.maximum(np.diag(information), 0.0))

@@ -16,13 +16,7 @@ _FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-shared", "-fPIC", "-w")
 
 
 def loaded(code: str) -> ctypes.CDLL:
-    """The library of a C text.
-
-    Raises
-    ------
-    PvidError
-        When there is no compiler, or it refuses the text.
-    """
+    """The library of a C text. Raises PvidError when there is no compiler, or it refuses the text."""
     compiler = host_compiler("a simulation")
     name = hashlib.sha256("\n".join((build_of(compiler), *_FLAGS, code)).encode()).hexdigest()[:24]
     place = cache_folder() / "plants" / f"{name}.so"

@@ -59,14 +59,10 @@ def drive_named(name: str, amplitude: float, low_hz: float, high_hz: float, numb
 
     Parameters
     ----------
-    name
-        A key of DRIVES.
-    amplitude
-        Largest value [SI].
-    low_hz, high_hz
-        Band of the excitation [Hz].
-    number
-        Of the input: the drives of several inputs differ.
+    name : a key of DRIVES
+    amplitude : largest value [SI]
+    low_hz, high_hz : band of the excitation [Hz]
+    number : of the input: the drives of several inputs differ
     """
     if name not in DRIVES:
         raise PvidError(f"{name} is no drive; known are {', '.join(DRIVES)}")

@@ -27,21 +27,14 @@ class Imperfections:
 
     Attributes
     ----------
-    friction
-        "sharp": the sign of a friction switches, and it sticks where it exceeds the other forces; "soft": the sign is
-        tanh(v / width) with the rig's width.
-    breakaway
-        Sharp: the friction that holds at rest over the one that slides, >= 1 (stiction).
-    backlash
-        Width of the play between what turns and its sensor [resolutions].
-    eccentricity
-        Amplitude of an encoder's error that comes back every turn [resolutions].
-    skew
-        Delay of a sensor's sample behind those of the others [s]; a multiple of the integration's step.
-    gain
-        What acts over what is recorded, of a driven signal; what is recorded over what is true, of another sensor.
-    process
-        White disturbance of an equation by its number from 0 [its unit / sqrt(Hz)], held for a sample.
+    friction : "sharp": the sign of a friction switches, and it sticks where it exceeds the other forces; "soft": the
+        sign is tanh(v / width) with the rig's width
+    breakaway : sharp: the friction that holds at rest over the one that slides, >= 1 (stiction)
+    backlash : width of the play between what turns and its sensor [resolutions]
+    eccentricity : amplitude of an encoder's error that comes back every turn [resolutions]
+    skew : delay of a sensor's sample behind those of the others [s]; a multiple of the integration's step
+    gain : what acts over what is recorded, of a driven signal; what is recorded over what is true, of another sensor
+    process : white disturbance of an equation by its number from 0 [its unit / sqrt(Hz)], held for a sample
     """
 
     friction: Law = "sharp"
@@ -65,13 +58,7 @@ class Imperfections:
 
 
 def sizes_of(settings: Iterable[str]) -> dict[str, Any]:
-    """Fields of Imperfections from KIND.SIGNAL=SIZE, as in skew.phi=1e-3.
-
-    Raises
-    ------
-    PvidError
-        Where one is not.
-    """
+    """Fields of Imperfections from KIND.SIGNAL=SIZE, as in skew.phi=1e-3. Raises PvidError where one is not."""
     out: dict[str, dict[str, float]] = {}
     for setting in settings:
         place, _, size = setting.partition("=")

@@ -42,13 +42,7 @@ class Linearised:
 
     @classmethod
     def of(cls, model: CompiledModel, p: npt.ArrayLike, knowns: Mapping[str, float]) -> Linearised:
-        """At parameters [n_p] and constants by name.
-
-        Raises
-        ------
-        PvidError
-            Where the equations do not determine a motion.
-        """
+        """At parameters [n_p] and constants by name. Raises PvidError where the equations do not determine a motion."""
         motion = motion_of(model)
         known = [knowns.get(one.name, one.value) for one in model.knowns]
         symbols = [*motion.states, *motion.inputs, *motion.constants, *motion.signs]

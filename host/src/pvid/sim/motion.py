@@ -57,10 +57,7 @@ class Motion:
 def motion_of(model: CompiledModel) -> Motion:
     """The equations solved for the highest derivatives.
 
-    Raises
-    ------
-    PvidError
-        When they are too few, not linear in the highest derivatives, or do not determine them.
+    Raises PvidError when they are too few, not linear in the highest derivatives, or do not determine them.
     """
     model.refuse_robot()
     inputs_of = {one.name: one for one in model.signals if one.driven or one.kind == "input"}

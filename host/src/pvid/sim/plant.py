@@ -77,10 +77,7 @@ class Trajectory:
 class Plant:
     """The plant of a model.
 
-    Raises
-    ------
-    PvidError
-        When the equations do not determine a motion, or there is no C compiler.
+    Raises PvidError when the equations do not determine a motion, or there is no C compiler.
     """
 
     def __init__(self, model: CompiledModel) -> None:
@@ -132,20 +129,13 @@ class Plant:
 
         Parameters
         ----------
-        constants
-            As `constants` gives them.
-        start
-            State [nx].
-        drives
-            By name of the driven signal; a held one is read at the samples, a smooth one within each step as well.
-        rate, samples
-            [Hz] and number.
-        disturbance
-            Added to the equations [samples, N], held.
-        every_step
-            The trajectory at every step of the integration, not at the samples alone.
-        gains
-            Factor of the drive by name: what acts is the factor times the drive.
+        constants : as `constants` gives them
+        start : state [nx]
+        drives : by name of the driven signal; a held one is read at the samples, a smooth one within each step as well
+        rate, samples : [Hz] and number
+        disturbance : added to the equations [samples, N], held
+        every_step : the trajectory at every step of the integration, not at the samples alone
+        gains : factor of the drive by name: what acts is the factor times the drive
         """
         inputs = self.motion.inputs
         missing = [jet.of for jet in inputs if jet.of not in drives]

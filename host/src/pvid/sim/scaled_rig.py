@@ -46,15 +46,12 @@ class ScaledRig:
 def scaled_rig(compiled: CompiledModel, sample_rate: float, most: Mapping[str, float] | None = None) -> ScaledRig:
     """A rig whose truth is the guess of a shipped mechanism's model.
 
+    Raises PvidError where the mechanism has no simulated rig, the samples are too slow for its motion, or no drive
+    keeps the simulation within bounds.
+
     Parameters
     ----------
     most : largest value of a drive, by name, where the rig has one
-
-    Raises
-    ------
-    PvidError
-        Where the mechanism has no simulated rig, the samples are too slow for its motion, or no drive keeps the
-        simulation within bounds.
     """
     if compiled.name not in names():
         raise PvidError(

@@ -102,10 +102,7 @@ class RigSimulation:
     def run(self, seed: int = 0, imperfections: Imperfections = PERFECT) -> dict[str, Float]:
         """t [s] and every signal in its unit, as recorded, each [samples].
 
-        Raises
-        ------
-        PvidError
-            Where nothing drives the mechanism and it starts at rest.
+        Raises PvidError where nothing drives the mechanism and it starts at rest.
         """
         rig = self.rig
         step = 1.0 / rig.sample_rate / rig.substeps
@@ -239,14 +236,10 @@ def rig_of_guess(
 
     Parameters
     ----------
-    drive, low_hz, high_hz
-        Name in `DRIVES`, and its band [Hz].
-    rate, duration
-        [Hz] and [s].
-    share
-        Largest value of each drive over the reach of its signal.
-    start
-        Coordinates and rates at the first sample, as in q or q_1 [SI]; 0 where none is given.
+    drive, low_hz, high_hz : name in `DRIVES`, and its band [Hz]
+    rate, duration : [Hz] and [s]
+    share : largest value of each drive over the reach of its signal
+    start : coordinates and rates at the first sample, as in q or q_1 [SI]; 0 where none is given
     """
     driven = [one for one in model.signals if one.driven or one.kind == "input"]
     return SimulatedRig(

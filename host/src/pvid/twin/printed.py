@@ -68,6 +68,8 @@ class SecondStage:
 class PrintedTwin:
     """An identifier of the weak form, in either arithmetic, with or without its second stage.
 
+    Raises PvidError when the core refuses the settings.
+
     Parameters
     ----------
     sources : of its library
@@ -82,11 +84,6 @@ class PrintedTwin:
     reach : ticks from a sample until the identifier has processed it completely, at most
     running_hash : FNV-1a after the last tick
     second : of the last run; None without a second stage
-
-    Raises
-    ------
-    PvidError
-        When the core refuses the settings.
     """
 
     def __init__(

@@ -566,16 +566,13 @@ def refined(
 ) -> Refined:
     """Blocks of each length [samples] in turn, each from the outcome of the one before.
 
+    Raises PvidError when the run, or its longest stretch, is shorter than a block.
+
     Parameters
     ----------
     r : to start from; that of the prior, or of `before`, by default
     before : an outcome whose motion gives the first starts
     most : passes for each length
-
-    Raises
-    ------
-    PvidError
-        When the run, or its longest stretch, is shorter than a block.
     """
     if problem.longest < lengths[0]:
         of = "the longest stretch without a gap" if problem.measured.stretches else "the run"

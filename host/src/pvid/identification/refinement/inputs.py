@@ -231,10 +231,7 @@ def inputs_of(
     """u [steps, 3, inputs] from recorded signals, and zeros in place of their rates; NaN where a signal is missing, or
     too near for a derivative.
 
-    Raises
-    ------
-    PvidError
-        For an input that is another derivative than the second of a recorded signal.
+    Raises PvidError for an input that is another derivative than the second of a recorded signal.
     """
     steps = sub * len(signals[made.outputs[0]])
     u = np.empty((steps, 3, len(made.inputs)))

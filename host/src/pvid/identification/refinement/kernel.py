@@ -107,8 +107,7 @@ class RefinedKernel:
 
         Parameters
         ----------
-        widths
-            by argument; by default the jump of the rate within a step that a friction's reversal makes: RK4 stays
+        widths : by argument; by default the jump of the rate within a step that a friction's reversal makes: RK4 stays
             stable and smooth
         coarse : where there are signs; from the number of samples by default
         """

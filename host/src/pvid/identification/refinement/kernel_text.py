@@ -37,10 +37,7 @@ _NO_PROGRAM = Program((), (), ())
 def printed(model: CompiledModel) -> tuple[RefineFunctions, str]:
     """The functions of a model's kernel, without their programs, and the kernel's C text.
 
-    Raises
-    ------
-    PvidError
-        Where the equations do not determine a motion.
+    Raises PvidError where the equations do not determine a motion.
     """
     place = cache_folder() / "kernels" / f"{_key(model)}.json"
     with suppress(ValueError, KeyError, TypeError):  # no such text, or none of ours

@@ -143,10 +143,7 @@ def problem_of(
 def known_stretches(u: Float, sub: int) -> list[Stretch]:
     """In which the inputs [steps, 3, inputs] are known; none: everywhere.
 
-    Raises
-    ------
-    PvidError
-        Where they are known nowhere.
+    Raises PvidError where they are known nowhere.
     """
     there = np.asarray(np.isfinite(u).all((1, 2)).reshape(-1, sub).all(1))
     if there.all():

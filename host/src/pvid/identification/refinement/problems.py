@@ -106,13 +106,7 @@ class Problems:
         return 2 * np.pi * self._fast * spread
 
     def problem(self, optional: tuple[str, ...] = ()) -> Problem:
-        """With these extras.
-
-        Raises
-        ------
-        PvidError
-            Where the inputs are known nowhere.
-        """
+        """With these extras. Raises PvidError where the inputs are known nowhere."""
         optional = tuple(sorted(optional))
         if optional not in self._problems:
             plays = [name for name in optional if name in self._plays]

@@ -63,10 +63,8 @@ TOO_LONG = "the refinement needs too many steps: the recording is long, or the g
 def refine(answer: Analysis) -> RefinedMechanism:
     """Refines the weak form's answer.
 
-    Raises
-    ------
-    PvidError
-        When the equations have no refinement, the recording is too short for it, or no start leads anywhere.
+    Raises PvidError when the equations have no refinement, the recording is too short for it, or no start leads
+    anywhere.
     """
     model, weak, recording = answer.model, answer.found, answer.recording
     model.refuse_constraints("the refinement")

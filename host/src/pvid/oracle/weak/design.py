@@ -32,15 +32,13 @@ class WeakDesign:
     decimation : raw samples a step
     taps, degree : of the polynomial smoother of values; 1 tap: none
     rate_taps, rate_degree : of the polynomial that gives the derivatives; 0 taps: those of the values
-    reversals
-        how sgn(v) is summed: "located" finds when v changes sign and gives the samples around it the weights of the
-        exact integral; "averaged" takes the mean of sgn over a step, v linear there; "decided" likewise, without the
-        windows in which a sign is in doubt in more than a part 1 / DOUBT of the steps of a half; "soft" is
-        tanh(v / soft)
+    reversals : how sgn(v) is summed: "located" finds when v changes sign and gives the samples around it the weights of
+        the exact integral; "averaged" takes the mean of sgn over a step, v linear there; "decided" likewise, without
+        the windows in which a sign is in doubt in more than a part 1 / DOUBT of the steps of a half; "soft" is tanh(v /
+        soft)
     soft : width of the soft sign [unit of the velocity]
     joint : whiten all row kinds together; noise that they share then counts once
-    comb
-        values and derivatives from block sums and compensators at the steps (pvid.oracle.weak.filters) in place of
+    comb : values and derivatives from block sums and compensators at the steps (pvid.oracle.weak.filters) in place of
         polynomials at the samples, with about as many taps. Needs a decimation above 1
     """
 

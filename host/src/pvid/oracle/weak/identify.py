@@ -174,8 +174,7 @@ def identify(
     start : of p, by name or in order; the guesses of the model where none is given
     design : None: chosen by predicted errors and chi^2 on this run
     compensate : take the bias of noisy regressors off
-    weights
-        "residuals": of the sensors and an error of the equations, estimated from the residuals; "sensors": of the
+    weights : "residuals": of the sensors and an error of the equations, estimated from the residuals; "sensors": of the
         sensors alone
     """
     model = ready(compiled)
@@ -306,10 +305,7 @@ def _judged(
 def _estimated(rows: WeakRows, start: Float | None, equation_error: bool, compensate: bool) -> Fit:
     """The estimate; where the search runs away, the last that could be computed.
 
-    Raises
-    ------
-    PvidError
-        When not even the start can be.
+    Raises PvidError when not even the start can be.
     """
     try:
         return gated(rows, start, equation_error, compensate)

@@ -346,10 +346,7 @@ class RobotFit:
 def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> RobotFit:
     """Base parameters from a run: name of each signal -> samples [n], in the model's units.
 
-    Raises
-    ------
-    PvidError
-        When the run is too short.
+    Raises PvidError when the run is too short.
     """
     whole = RobotRun(model, run, sample_rate)
     columns = tuple(one.standard for one in whole.chain.base)

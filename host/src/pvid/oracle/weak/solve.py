@@ -262,6 +262,9 @@ def batch(
 ) -> Fit:
     """All windows at once: whiten at p, step, and again until p stays.
 
+    Raises DivergedError when p leaves what numbers hold. Raises numpy.linalg.LinAlgError when the rows cannot be
+    whitened at the start.
+
     Parameters
     ----------
     rows : windows of a run
@@ -270,13 +273,6 @@ def batch(
     compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R / d theta
     passes : of whitening at the present p, at most
     settled : a first step of a pass below this ends them, in units of a parameter's reach
-
-    Raises
-    ------
-    DivergedError
-        When p leaves what numbers hold.
-    numpy.linalg.LinAlgError
-        When the rows cannot be whitened at the start.
     """
     last: Fit | None = None
     try:
@@ -329,10 +325,7 @@ def resumed(rows: WeakRows, fit: Fit, passes: int) -> Fit:
     """The estimate from other rows of the same windows, from where a fit came to rest: the errors of the equations keep
     their orders.
 
-    Raises
-    ------
-    numpy.linalg.LinAlgError, FloatingPointError
-        When the numbers run away.
+    Raises numpy.linalg.LinAlgError, FloatingPointError when the numbers run away.
     """
     parameters, p, errors = rows.compiled.parameters, fit.p, fit.errors
     prior = parameters.prior(fit.start)

@@ -363,8 +363,7 @@ def disagreement(
 
     Parameters
     ----------
-    text
-        Of the sentence, with {names} of the parameters in question, and of the first one {name}, {one} and {other}.
+    text : of the sentence, with {names} of the parameters in question, and of the first one {name}, {one} and {other}
     """
     size = np.where(parameters.positive, np.maximum(np.abs(one), np.abs(other)), parameters.sd)
     apart = np.flatnonzero((clash > _CLASH) & (np.abs(one - other) > _VISIBLE * size))

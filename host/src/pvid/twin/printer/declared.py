@@ -18,15 +18,12 @@ from pvid.twin.printer.term import ATOM, INTEGERS, STANDARD, TAKEN, UNARY, Funct
 class Declared:
     """The declarations of a unit, and what is printed of it so far.
 
+    Raises UntranslatedError at a construct without a translation, with its file and line.
+
     Parameters
     ----------
     unit : as read
     roots : names of functions and tables that are wanted, with all that they need; empty: all
-
-    Raises
-    ------
-    UntranslatedError
-        At a construct without a translation, with its file and line.
     """
 
     out: list[str]  # lines of the function or table that is printed

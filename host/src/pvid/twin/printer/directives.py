@@ -121,13 +121,7 @@ class Reader:
             self._macros[name] = Macro(self._macros[name].body)
 
     def read(self, source: Path) -> None:
-        """Adds a source.
-
-        Raises
-        ------
-        UntranslatedError
-            At an #error, or a header that is not found.
-        """
+        """Adds a source. Raises UntranslatedError at an #error, or a header that is not found."""
         self.unit.chunks.append(len(self.unit.lines))
         before = dict(self._macros)
         own: set[str] = set()

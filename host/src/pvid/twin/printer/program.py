@@ -39,6 +39,8 @@ def text_of(
 ) -> str:
     """The printed module's text.
 
+    Raises UntranslatedError at a construct without a translation, with its file and line.
+
     Parameters
     ----------
     sources : .c files
@@ -47,11 +49,6 @@ def text_of(
     roots : functions and tables that are wanted, with all that they need; empty: all
     texts : name -> text of generated files; those that end with .c are sources as well
     about : the module's docstring
-
-    Raises
-    ------
-    UntranslatedError
-        At a construct without a translation, with its file and line.
     """
     reader = Reader(folders, macros, texts)
     for one in [*sources, *(Path(name) for name in texts or () if name.endswith(".c"))]:
