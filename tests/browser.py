@@ -1,7 +1,5 @@
 """Debian's Chromium without a screen."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path

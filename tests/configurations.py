@@ -4,8 +4,6 @@ what lies beyond is refused with the status that names the field.
 tests/core/test_bad_config.py asserts it; tools/mutate.py and tools/coverage.py play `digest`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What several tests share: the builds of the core, made once a session."""
 
-from __future__ import annotations
-
 import gc
 import os
 import subprocess

@@ -1,8 +1,6 @@
 """Twenty-one sets of constraints g = 0 and h >= 0 on rows Y = N^T theta, and their optimum by sequential quadratic
 programming."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

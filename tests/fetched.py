@@ -1,7 +1,5 @@
 """What tests fetch once, into build/fetched."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

@@ -5,8 +5,6 @@ A line is JSON: folder, words of the command, and the files for its standard out
 for each is the exit code. tests/program.py starts it.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import os

@@ -1,7 +1,5 @@
 """Counts that no mechanism makes."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """A first-order plant with a drag that its model lacks, as a recording, for tests of what answers contain."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

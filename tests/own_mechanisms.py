@@ -1,7 +1,5 @@
 """Mechanisms in files of one's own, with a recording of each: one without an input, one that is no motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path

@@ -4,8 +4,6 @@ The equations are those of theory.md 1, with sines (full) or for small angles (l
 Angles of the state are absolute: phi1 and phi1 + phi.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The estimator printed from its C, with the interface of block_models: of either arithmetic, on any model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from types import ModuleType
 from typing import Any

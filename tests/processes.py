@@ -1,7 +1,5 @@
 """The processes of this machine."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 

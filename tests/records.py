@@ -1,7 +1,5 @@
 """The record of the parameters (pvid/record.h), written and read by the compiled core."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pvid.core.native import Publisher

@@ -1,8 +1,6 @@
 """Arms, and the torques of rigid bodies by Newton and Euler in the frame of the base, with accelerations: an author of
 its own beside the momenta of pvid.model.chain."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

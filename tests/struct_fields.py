@@ -1,7 +1,5 @@
 """Fields of structs of C by their paths."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

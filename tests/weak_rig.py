@@ -1,7 +1,5 @@
 """The shipped mechanisms on their simulated rigs with the weak identifier: tables, settings, samples, library, twin."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache

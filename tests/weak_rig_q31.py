@@ -1,7 +1,5 @@
 """Fixed-point weak identifiers of the shipped mechanisms: formats, runs as counts, and their C as a library."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 from functools import cache, cached_property

@@ -1,8 +1,6 @@
 """What a snapshot of the weak form must contain and refuse, from the headers: pointers of the state, fields of the
 configuration with all tables that it points to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

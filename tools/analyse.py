@@ -17,8 +17,6 @@ Ports are read as their processor's compilers read them, the applications as for
 old to have -fanalyzer.
 """
 
-from __future__ import annotations
-
 import argparse
 import fnmatch
 import hashlib

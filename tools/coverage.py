@@ -10,8 +10,6 @@ the sources with all counts. Five minutes of one core. Exits 1 below 95 % of the
 its other branch is misuse, and ends the program.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shlex

@@ -8,8 +8,6 @@ mkdocs checks links and anchors between the pages of the site; this program thos
 which GitHub shows. Nothing is loaded from the network. Needs mkdocs-material and doxygen.
 """
 
-from __future__ import annotations
-
 import argparse
 import inspect
 import os

@@ -8,8 +8,6 @@ it on the same line belongs to what stands before it, the first of the file desc
 is, line by line.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -4,8 +4,6 @@ the cache is in XDG_CACHE_HOME or ~/.cache, or in build/cache where nobody may w
 from its top.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

@@ -6,8 +6,6 @@ tools/pvid installs, then what it adds for parquet, mcap and campaigns, then wha
 and the hashes of its files, for Linux on any processor and Python 3.11 and later. Run it by the Python of build/venv.
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

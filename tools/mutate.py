@@ -16,8 +16,6 @@ A survivor stands in tests/mutants.toml with its reason, or the command fails. `
 test could see it, and why; such a mutant is left out of the second of the two rates.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

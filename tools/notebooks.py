@@ -8,8 +8,6 @@ Jupyter itself is not needed: a cell's output is what it prints, and the value o
 HTML or text, in this order.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import base64

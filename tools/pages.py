@@ -9,8 +9,6 @@ line in a folder with recordings, rig files and a model (`prepared`). A fence `t
 print. tests/tools/test_pages.py executes all of it.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import io

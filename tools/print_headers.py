@@ -6,8 +6,6 @@ the version. --check: only compares.
 Run it with build/venv/bin/python after a change of the headers, when ./tools/pvid has built the C core.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

@@ -6,8 +6,6 @@
 Run it with build/venv/bin/python after a change of the pendulum's description or of the printers.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -18,8 +18,6 @@ contracts and loop invariants in their source, and Frama-C's WP proves these, th
 loop ends, goal by goal, with z3.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

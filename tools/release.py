@@ -1,7 +1,5 @@
 """What tools/release runs: the parts of a release, each built from what is committed and tested in a clean folder."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -4,8 +4,6 @@ Costs of the core are those of tests/budget.toml, here and in the last tag; line
 the tests is that of the run, beside the time of the last version in tests/budget.toml.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tomllib

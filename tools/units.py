@@ -5,8 +5,6 @@ an AVR with its int and size_t of 16 bits; a port for the machine that it is the
 a rig: headers of tests/analysis replace those that board.stream_image and board.replay_image make.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import shutil

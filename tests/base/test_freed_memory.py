@@ -1,7 +1,5 @@
 """Memory that stays with the process."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Packages that not everybody needs: what does without them, and what a message tells to type."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What is kept of the last few arguments is made once for equal ones."""
 
-from __future__ import annotations
-
 from pvid.base.recent import Recent
 
 

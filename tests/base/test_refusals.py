@@ -1,7 +1,5 @@
 """Sentences of refusals: each is in a test, here where in no other, but for those that a fault of a machine gives."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable, Iterator

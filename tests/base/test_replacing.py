@@ -1,7 +1,5 @@
 """pvid replaces the files that it wrote, as it wrote them, and nothing else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

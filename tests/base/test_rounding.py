@@ -1,7 +1,5 @@
 """Units with a prefix, for any number that a board may send."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

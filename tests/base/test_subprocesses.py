@@ -1,7 +1,5 @@
 """Emulators belong to the program that started them: it alone gets Ctrl-C, and none is left behind."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

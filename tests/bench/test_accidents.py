@@ -1,7 +1,5 @@
 """Accidents of a recording: the bench's kinds are what they claim to be, and the table has each of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The bench of the choices of a build: each is there, and a smaller build is smaller."""
 
-from __future__ import annotations
-
 import pytest
 
 from bench.build_choices import CHOICES, HEADER, Choice, footprint_of

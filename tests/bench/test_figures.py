@@ -1,7 +1,5 @@
 """The page of benchmarks: sentences and pictures are those of the tables of results; a table names its command."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The hard cases in short: what is published is covered by its standard errors, or comes with an alarm."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

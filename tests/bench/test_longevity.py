@@ -1,7 +1,5 @@
 """Long runs in short: what a disturbance leaves behind, in every lane."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

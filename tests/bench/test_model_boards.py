@@ -1,7 +1,5 @@
 """The bench of every mechanism on every board: one row in part, and that a wrong bit shows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

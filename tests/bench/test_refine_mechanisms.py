@@ -1,8 +1,6 @@
 """Both stages in C on the other mechanisms: a large motion is found, kept and refined without bias, with the twin's
 bits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

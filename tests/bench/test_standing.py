@@ -1,7 +1,5 @@
 """bench standing, short: its columns count what they say; no clean run or accident leaves a wrong valid estimate."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The bench of the weak identifier against the oracle: its short form, and its table."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

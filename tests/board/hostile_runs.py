@@ -5,8 +5,6 @@ sensor sends; for a compiler that checks every access and every operation and en
     python hostile_runs.py --planted  reads one byte behind an array, to show that it would be seen
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Boards of four kinds of mechanism: two shipped ones, one without an input and one in a file of the user's own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Field mode: a board that samples by itself; its samples from the sensor's twin, its bits from the host's core."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Any mechanism on a board, in either arithmetic: recorded, verified by the twin, exported under its own names."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

@@ -6,8 +6,6 @@ unsigned number may wrap but where tests/sanitizers.ignore says so. The program 
 valgrind, which sees the use of what was never written.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Ports as a user names them: a device, a socket; and what is said where one does not open."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """Every port from the outside: memory, counter, stack, bytes both ways, faults, the exit code, square roots."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

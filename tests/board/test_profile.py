@@ -1,7 +1,5 @@
 """Instructions of a tick by function: their sum is the whole, and the table of results has them as measured."""
 
-from __future__ import annotations
-
 import pytest
 
 from bench.figures import results_of

@@ -1,7 +1,5 @@
 """Both stages with the generated C of a mechanism on an emulated board: the hash of the core on this computer."""
 
-from __future__ import annotations
-
 import pytest
 
 from pvid.board.boards import BOARDS

@@ -1,7 +1,5 @@
 """A board with the second stage behind the link: its bits, its log, and what shows which estimate is published."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

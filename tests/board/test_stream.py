@@ -1,7 +1,5 @@
 """A run played over a serial link: the same bits whatever the line does, and an exact account of what it did."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """The strong form of a described mechanism by the command line: identified, compared with its twin and on a board."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The core on every board: built by its cross compiler, run in its emulator, the bits of the host and the twin."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

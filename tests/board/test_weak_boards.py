@@ -1,7 +1,5 @@
 """The weak form of a mechanism on emulated boards, in either arithmetic: the hash that the twin predicts."""
 
-from __future__ import annotations
-
 import json
 import re
 import zlib

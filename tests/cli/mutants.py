@@ -4,8 +4,6 @@ Whatever a user gives, a command ends with one of its exit codes; a refusal is a
 exception escapes, no library warns, no answer contains nan or inf, and nothing takes long. All is drawn from a seed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math

@@ -1,7 +1,5 @@
 """`import pvid`: what a program or a notebook uses."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import subprocess

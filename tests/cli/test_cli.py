@@ -1,7 +1,5 @@
 """End to end through the command line: what a user types, what comes back, and the exit code."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

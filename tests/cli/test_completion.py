@@ -1,7 +1,5 @@
 """The shell completes commands, options and mechanisms; what is nearly a command is proposed."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """`pvid demo MODEL`: both stages and either arithmetic, their twins and a board agree, beside the truth."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from types import SimpleNamespace

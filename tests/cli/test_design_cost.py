@@ -1,7 +1,5 @@
 """`design --on BOARD`: what a design costs on an emulated board, before one is flashed."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

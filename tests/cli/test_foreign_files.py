@@ -1,7 +1,5 @@
 """Files from somebody else never choose what runs: a model file that a log or a rig file names is not executed."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`identify --core f32|q31` and `compare` of described mechanisms, from the recording to the printed answer."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

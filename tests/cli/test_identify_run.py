@@ -1,7 +1,5 @@
 """Mechanisms through the command line: check, simulate, identify, predict, build, and what is refused."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

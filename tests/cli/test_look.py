@@ -1,7 +1,5 @@
 """`pvid look`: what is in a file, and a next command that works."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import shlex

@@ -1,7 +1,5 @@
 """Mutated rig files, runs and command lines: nothing but answers and sentences comes back."""
 
-from __future__ import annotations
-
 import os
 from itertools import islice
 from pathlib import Path

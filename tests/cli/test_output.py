@@ -1,7 +1,5 @@
 """Output that is full, closed or read by nobody, and files that appear whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import resource
 import stat

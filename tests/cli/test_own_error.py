@@ -1,7 +1,5 @@
 """What nobody foresaw: one sentence, a report in a file without secrets, and an exit code of its own."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

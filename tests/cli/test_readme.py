@@ -1,7 +1,5 @@
 """Pages: programs compile and run, commands and options exist, names and figures are right."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """A result in Python: values, intervals, covariance, residuals, words, tables, files; and the data that Python has."""
 
-from __future__ import annotations
-
 import ast
 import json
 import sys

@@ -1,7 +1,5 @@
 """Runs as people have them, through the command line: no rig file, other columns, gaps, jitter; and their cost."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Several recordings of a mechanism in one call of `pvid identify`."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

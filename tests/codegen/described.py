@@ -1,7 +1,5 @@
 """Compiled models written by hand: every kind of input, operation and column that a compiler can make."""
 
-from __future__ import annotations
-
 import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Known, Row, Signal, Unknown

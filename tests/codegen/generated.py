@@ -1,7 +1,5 @@
 """The generated C of a model as a library of this machine, and its results on many vectors at once."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 from functools import cache

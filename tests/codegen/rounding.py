@@ -1,7 +1,5 @@
 """How far rounding can move the results of a list of operations, to first order and with the products of errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

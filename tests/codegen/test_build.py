@@ -1,7 +1,5 @@
 """The folder of a generated model: two lines of CMake build it, its test runs, --check finds changes."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

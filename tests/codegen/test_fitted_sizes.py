@@ -1,7 +1,5 @@
 """A build for one design alone: smaller buffers, the same bits whatever the samples; other designs are refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

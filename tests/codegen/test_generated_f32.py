@@ -1,7 +1,5 @@
 """Generated float32: the values of the SymPy expressions within rounding, in C and in its printed twin."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

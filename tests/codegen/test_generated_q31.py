@@ -1,7 +1,5 @@
 """Generated fixed point: the values of the expressions within the rounding of their formats, in C and its twin."""
 
-from __future__ import annotations
-
 import subprocess
 from fractions import Fraction
 from pathlib import Path

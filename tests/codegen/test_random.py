@@ -1,7 +1,5 @@
 """Expressions that nobody chose: C and its printed twin give the same bits, and the values within rounding."""
 
-from __future__ import annotations
-
 import ctypes
 import random
 import subprocess

@@ -1,7 +1,5 @@
 """The refinement's functions: C and its twin have the same bits, values and derivatives are those of the equations."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 import sys

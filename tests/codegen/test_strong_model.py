@@ -1,7 +1,5 @@
 """The printed strong form of every mechanism: the sums of the paper's equations, bits of C and twin, convergence."""
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import replace
 from functools import cache

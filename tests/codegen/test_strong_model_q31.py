@@ -1,7 +1,5 @@
 """The printed strong form in fixed point: bits of C and twin on wild runs, accuracy, refusals of init and of models."""
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """The generated row of the strong form is the weak form's equation without integration by parts."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

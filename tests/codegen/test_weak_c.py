@@ -1,7 +1,5 @@
 """The generated C of the weak form: its gains are the oracle's, and it compiles without a warning."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The tables of the weak core say what the float64 oracle computes: an emulation in float64 reads nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The weak forms of all shipped mechanisms: their designs, and their C in one library."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

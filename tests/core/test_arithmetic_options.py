@@ -1,7 +1,5 @@
 """Compilers' options that could change bits: the sources forbid them, or pvid_arithmetic_faults_f32 finds them."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -4,8 +4,6 @@ Each is refused with the status that names the field; and what is accepted, howe
 number, whatever the samples. tests/unit/test_own_models.c has what takes a model of the user's own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Bounds are constraints: with one that acts, the other parameters are those of the constrained least squares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear

@@ -1,7 +1,5 @@
 """Constraints between parameters: the estimate is that of sequential quadratic programming, in float64 and in C."""
 
-from __future__ import annotations
-
 import subprocess
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The fixed-point core as a user meets it: no floating point in its objects, the command line, the C header."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

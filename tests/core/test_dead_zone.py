@@ -1,7 +1,5 @@
 """The dead zone: p rests while the data ask for less than noise explains; its rule in the weak form."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 """Parameters that drift along given directions alone: the C core against the batch problem that it solves, and a
 motor whose winding heats."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

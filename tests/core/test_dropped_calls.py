@@ -1,7 +1,5 @@
 """gcc 12 takes an array at a bare offset for a null pointer; it may then remove a call of the function that uses it."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """Rigs whose equations have an error of their own that the design does not contain."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What Python reads from the C headers, and what it keeps in a form of its own."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

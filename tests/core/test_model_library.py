@@ -1,7 +1,5 @@
 """The library of a described mechanism: compiled once, found again, and one sentence where there is no compiler."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from collections.abc import Iterator

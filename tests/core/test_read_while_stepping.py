@@ -1,7 +1,5 @@
 """An estimate that is read while others step is whole: threads under ThreadSanitizer, interrupts in emulators."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from functools import cache

@@ -4,8 +4,6 @@ The reference moves at every 37th tick: through all places of a block of steps, 
 of samples and of a half window, while blocks are added and windows joined.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

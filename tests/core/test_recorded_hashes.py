@@ -7,8 +7,6 @@ changes the bits on purpose records them anew and explains why. The samples and 
 library of this machine computes others, the hashes say nothing.
 """
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from pathlib import Path

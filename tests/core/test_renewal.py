@@ -1,7 +1,5 @@
 """Rows that came in at a poor start, and do not fit where p has settled since, fade."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

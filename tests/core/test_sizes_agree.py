@@ -1,7 +1,5 @@
 """init refuses an application whose sizes are not the library's and writes nothing: every size, C and C++."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

@@ -4,8 +4,6 @@ The fields are those of the headers: a new one that neither the snapshot nor the
 fixed-point core: tests/twin/test_weak_snapshot_q31.py.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

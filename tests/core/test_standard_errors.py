@@ -1,7 +1,5 @@
 """Standard errors that are published: of sums that lost their digits, and of rows that are not white."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Texts of reasons and statuses in C: those of the host; left out by a macro."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The trust of the fixed-point weak form: what it publishes, what it holds back, and float32's verdicts beside it."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Front end, sums and white columns of the fixed-point weak form beside the float64 oracle; no count overflows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from weak_rig_q31 import DESIGNS, Core, Int, Rig, core_in, rig

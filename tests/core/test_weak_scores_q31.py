@@ -1,7 +1,5 @@
 """The scatter of scores in integers, printed from its C, beside the rule in float64."""
 
-from __future__ import annotations
-
 from functools import cache
 from types import ModuleType
 

@@ -1,7 +1,5 @@
 """Snapshots of the fixed-point weak identifier: bits from any tick on, what differs is refused with its own status."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What init of the fixed-point weak identifier refuses: every shift, count, index and factor of its tables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

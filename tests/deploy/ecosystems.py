@@ -2,8 +2,6 @@
 installed (arduino-mk would drag in a Java environment, newlib 370 MB), and the packers of PlatformIO and ESP-IDF in
 an environment of their own."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A package of `pvid deploy`, built as a user does."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Mapping

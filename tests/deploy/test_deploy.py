@@ -1,7 +1,5 @@
 """What `pvid deploy` writes is built by the ecosystems' own files, and its example identifies the motor."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The Arduino package, built by arduino-mk on Arduino's own core and run on an emulated Mega; and what an Uno holds."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The programs of firmware/examples, built on a deployed package as C and as C++, and run."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tables for the core: the C compiler reads the very float32 that Python wrote."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

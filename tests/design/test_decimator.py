@@ -1,7 +1,5 @@
 """The front end's filters: what they promise against a direct FFT of their taps, what they keep exactly, refusals."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

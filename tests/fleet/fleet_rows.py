@@ -1,7 +1,5 @@
 """Rows of a fleet, as of recordings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`pvid batch`: a row for each recording, whatever it contains; resumed; a page that names what drifts."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """What changed in a fleet: found beyond chance, named with its date, not hidden by warnings or by errors of scale."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """Mechanisms to refine, their recordings, and answers of the weak form: two whose drive is differentiated, a shipped
 one with an input, and two in files of one's own, one of them without an input."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """The line that an answer prints for a missing term is typed as it stands, and the values are right with it."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Both cores of the weak identifier, and the refinement, have the forgetting and the gate of the rig file."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

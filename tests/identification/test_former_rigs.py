@@ -1,7 +1,5 @@
 """Rigs that failed once, of the random ones of tests/data/rigs: each is identified now, whatever was wrong with it."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Mapping

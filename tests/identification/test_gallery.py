@@ -1,7 +1,5 @@
 """The mechanisms that no heavy test takes: recognised by their columns, and identified by the core from their rigs."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What an answer predicts: another run, and motion of its own that it was not fitted to."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Advice on signs and units: right where a column is wrong, silent on clean recordings and on missing terms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Mechanisms of a user, simulated in closed form or by Runge-Kutta of this file: what only they showed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

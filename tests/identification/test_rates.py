@@ -1,7 +1,5 @@
 """Recordings whose signals do not share every row give the parameters of the mechanism."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

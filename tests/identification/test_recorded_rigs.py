@@ -1,7 +1,5 @@
 """Real hardware, and a cell that is no RC circuit: identified on one recording, and another one predicted."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Settings of the second stage from a run."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

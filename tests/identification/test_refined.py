@@ -1,7 +1,5 @@
 """Refinement in float64: derivatives of its kernels, blocks, the first fit of a mechanism with friction."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

@@ -1,7 +1,5 @@
 """When a refinement is the answer, what it makes of parameters that the weak form lacks, and what is doubted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

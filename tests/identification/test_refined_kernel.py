@@ -1,7 +1,5 @@
 """What a refinement is compiled from, and the splines between its samples."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The second stage of kinds of mechanisms that no shipped one is: algebraic equations, no input, many unknowns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Which length of block a refinement in float64 takes, and how far it widens a friction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The search of a refinement: starts, blocks, extras, gaps and jumps of the drive, for several mechanisms."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

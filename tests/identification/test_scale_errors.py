@@ -1,7 +1,5 @@
 """What a wrong gain or constant does to the parameters, and that the standard errors contain it: of any mechanism."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

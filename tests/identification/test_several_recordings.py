@@ -1,7 +1,5 @@
 """Several recordings of one mechanism: shared parameters, own ones, and what predicts them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sensors that are sampled at two instants, put right by a delay of the rig file."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """One word for an answer and for each parameter: what each reason leaves of which value, the same for all printers."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from functools import cache

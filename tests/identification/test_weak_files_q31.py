@@ -1,7 +1,5 @@
 """The files of a mechanism's fixed-point weak form for a rig: they compile in a project without pvid's own flags."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A run that nothing fits ends, with the right advice."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The frame codec: Python against C on the same bytes, and both against damage."""
 
-from __future__ import annotations
-
 import random
 import re
 import struct

@@ -1,7 +1,5 @@
 """Exports of a log, read back with the libraries that others read them with; the tee; identify on a log."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import json

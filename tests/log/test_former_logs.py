@@ -1,7 +1,5 @@
 """Logs that a former version recorded: verified, exported and identified as by that version."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

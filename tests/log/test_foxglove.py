@@ -1,7 +1,5 @@
 """Foxglove's live server, by a client of the protocol that its SDK documents (github.com/foxglove/ws-protocol)."""
 
-from __future__ import annotations
-
 import json
 import signal
 import socket

@@ -1,7 +1,5 @@
 """Layout files: every plotted field is one that the exporter and the tee write, in the structure the programs read."""
 
-from __future__ import annotations
-
 import json
 import re
 import socket

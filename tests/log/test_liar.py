@@ -1,7 +1,5 @@
 """A board that lies: no lie ends a recording, breaks what looks on, or locks a log; nor does a mutant of a frame."""
 
-from __future__ import annotations
-
 import io
 import json
 import random

@@ -1,7 +1,5 @@
 """The log: what a board sent is in it, whatever becomes of the line, the board and the logger."""
 
-from __future__ import annotations
-
 import errno
 import io
 import itertools

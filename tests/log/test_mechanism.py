@@ -1,7 +1,5 @@
 """What a log takes from the description of its mechanism: names, units, and outputs with their standard errors."""
 
-from __future__ import annotations
-
 import io
 import re
 

@@ -1,7 +1,5 @@
 """A log by the names that the board gave, of another mechanism and of a liar; and one of a former schema."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

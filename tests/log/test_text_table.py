@@ -1,7 +1,5 @@
 """A board that prints lines of numbers is recorded as a table that identify reads; one that sends frames is not."""
 
-from __future__ import annotations
-
 import os
 import pty
 import random

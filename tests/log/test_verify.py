@@ -1,7 +1,5 @@
 """A log computed again by the twin: equal where the board was right, and the first wrong bit named."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Who verifies a log: the compiled core all of it, the twin samples of it and every difference; the twin alone else."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Mechanisms with something amiss, in one place for the tests of refusals and of identifiability."""
 
-from __future__ import annotations
-
 import sympy as sp
 
 from pvid.model import Model, cos, sgn, sin

@@ -1,7 +1,5 @@
 """Model files: ten lines; what is wrong in one is said in one sentence with file, line, symbol and cause."""
 
-from __future__ import annotations
-
 import ast
 import re
 import time

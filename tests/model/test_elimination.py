@@ -1,7 +1,5 @@
 """What is not measured is eliminated exactly, or refused by name."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

@@ -1,7 +1,5 @@
 """What the rows determine is said in closed form, whatever the drive."""
 
-from __future__ import annotations
-
 import pytest
 from mechanisms_to_refuse import arm, cart, cell, free_pendulum, motor, squares, two_sensors, two_sums
 

@@ -1,7 +1,5 @@
 """The compiled pendulum has the theta of the paper's constraints, and the paper's strong form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import sympy as sp

@@ -1,7 +1,5 @@
 """Lowering is an identity, and moves every derivative that can be moved."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

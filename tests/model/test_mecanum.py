@@ -1,7 +1,5 @@
 """The shipped mecanum platform against Kane's method of SymPy, from where its rollers touch the ground."""
 
-from __future__ import annotations
-
 import numpy as np
 import sympy as sp
 from sympy.physics.mechanics import (

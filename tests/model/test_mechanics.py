@@ -1,7 +1,5 @@
 """Equations formed by sympy.physics.mechanics are those of the same mechanism written by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

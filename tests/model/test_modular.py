@@ -1,7 +1,5 @@
 """Residues of a large prime stand for rational numbers."""
 
-from __future__ import annotations
-
 import random
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Model files from URDF and MJCF, against MuJoCo's own torques."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Robots: the momenta's rows against Newton and Euler, base parameters, and what a description refuses."""
 
-from __future__ import annotations
-
 import math
 import re
 import time

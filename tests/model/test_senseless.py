@@ -1,7 +1,5 @@
 """Expressions without sense as model files: each is a report or one sentence, never a traceback."""
 
-from __future__ import annotations
-
 import random
 
 import sympy as sp

@@ -1,7 +1,5 @@
 """The strong form of the shipped mechanisms is their weak rows with every derivative carried out."""
 
-from __future__ import annotations
-
 import pytest
 import sympy as sp
 

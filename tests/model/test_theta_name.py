@@ -1,7 +1,5 @@
 """Natural names of signals and parameters are allowed, also those of the generated code's own arrays."""
 
-from __future__ import annotations
-
 import pytest
 
 from pvid.model import Model, sin

@@ -1,7 +1,5 @@
 """Units of terms are checked; only coherent units of SI are accepted."""
 
-from __future__ import annotations
-
 import pytest
 import sympy as sp
 from sympy.physics import units as si

@@ -1,7 +1,5 @@
 """Force noise shrinks an inertia where the band is wide; the other line and its alarm show it."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Corners of signals at the edges of held inputs that are multiplied by measured signals."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

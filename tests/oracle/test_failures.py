@@ -1,7 +1,5 @@
 """Numbers that run away: of a check beside the fit they are named, of the fit itself nothing is identified."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

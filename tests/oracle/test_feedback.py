@@ -1,7 +1,5 @@
 """`feedback` is a controller's: an input that is a function of the outputs for another reason has no warning."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

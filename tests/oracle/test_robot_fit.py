@@ -1,7 +1,5 @@
 """Base parameters from recordings of arms whose torques are those of Newton and Euler."""
 
-from __future__ import annotations
-
 import re
 import tracemalloc
 from collections.abc import Callable

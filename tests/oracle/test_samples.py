@@ -1,7 +1,5 @@
 """Clipping, standstill, a rate that is too low, guesses off by one factor: named in one sentence, and only where so."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

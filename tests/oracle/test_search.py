@@ -1,7 +1,5 @@
 """Searches of a design and of p that start far off, or with filters that blur a measured drive."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A run with few windows is identified, without a comparison of its halves; one with none is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import ROOT

@@ -1,7 +1,5 @@
 """The strong form of described mechanisms: rows, both laws, and what noise does to it."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

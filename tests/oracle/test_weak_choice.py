@@ -1,7 +1,5 @@
 """The choice of a design by its predicted errors, and verdicts on inputs that the outputs explain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

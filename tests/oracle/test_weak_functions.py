@@ -1,7 +1,5 @@
 """Test functions as sums of exponentials, half-window sums, running integrals and located reversals, by brute force."""
 
-from __future__ import annotations
-
 import gc
 import weakref
 

@@ -1,7 +1,5 @@
 """The generic weak form on simulated rigs: accuracy, standard errors, located friction, verdicts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any

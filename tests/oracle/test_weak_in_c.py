@@ -1,7 +1,5 @@
 """The weak identifier in C float32 against the float64 oracle with the same design, on rigs without sharp friction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from weak_rig import weak_rig

@@ -1,7 +1,5 @@
 """Segments between missing samples are runs of their own, and are identified together."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

@@ -1,7 +1,5 @@
 """An equation's error that is not white is tried as a white one, and the distance is part of the standard errors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Unknowns whose truth is 0, unknowns that the run does not determine, and bounds of the search."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """A run of the paper's pendulum in counts, and its identifier: by hand in numpy and on the core in its literal form."""
 
-from __future__ import annotations
-
 import ctypes
 from dataclasses import dataclass
 from functools import cache, cached_property

@@ -1,7 +1,5 @@
 """The paper's identifier by hand against the C core in its literal form: the same bits at every tick and on boards."""
 
-from __future__ import annotations
-
 import subprocess
 from functools import cache
 from pathlib import Path

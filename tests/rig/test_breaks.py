@@ -1,7 +1,5 @@
 """Wild samples and jumps of a signal are found; what a drive does by itself is not."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

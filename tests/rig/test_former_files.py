@@ -1,7 +1,5 @@
 """Rig files and settings of the pendulum's former dialect, and mechanisms that nobody names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rig file of any mechanism: values reach the model, and every mistake is a sentence that names it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

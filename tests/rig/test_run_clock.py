@@ -1,7 +1,5 @@
 """Clocks that are not uniform and samples that are missing: bridged where the run allows it, and always told."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

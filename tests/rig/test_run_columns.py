@@ -1,7 +1,5 @@
 """Files as programs and loggers write them: names, units, separators, decimal commas, comments, cut ends."""
 
-from __future__ import annotations
-
 import gzip
 import itertools
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An encoder that starts over after a turn: joined and told; nothing else is changed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

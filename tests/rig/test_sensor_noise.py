@@ -1,7 +1,5 @@
 """White noise of a sensor that is larger than its rig states; a mechanism that is held before it moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The step of a sensor, found in what it recorded."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Several recordings as one: segments behind each other, each with its name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

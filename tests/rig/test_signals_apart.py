@@ -1,7 +1,5 @@
 """Each signal comes to the common clock by itself: blank cells, inputs logged on change, sensors of other rates."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

@@ -1,7 +1,5 @@
 """Stamps that run back: counters that wrap, rows out of order, wild stamps, restarts, rows written twice."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

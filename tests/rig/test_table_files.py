@@ -1,7 +1,5 @@
 """Tables as instruments, loggers, boards and middleware write them: the same samples come out of each."""
 
-from __future__ import annotations
-
 import datetime
 import re
 from pathlib import Path

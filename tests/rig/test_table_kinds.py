@@ -1,7 +1,5 @@
 """The same samples from arrays of every kind, and from the files of other programs."""
 
-from __future__ import annotations
-
 import datetime
 import decimal
 import json

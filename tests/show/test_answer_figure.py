@@ -1,7 +1,5 @@
 """A figure of a described mechanism shows the answer that is printed, for every shipped mechanism."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

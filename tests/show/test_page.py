@@ -1,7 +1,5 @@
 """The live page: in a browser, beside a recording that it can neither slow nor end."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal

@@ -3,8 +3,6 @@
 PVID_PICTURES=folder ./tools/test --long tests/show/test_pictures.py      leaves the pictures there, to be looked at
 """
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The report of an identification: one page for every mechanism and every kind of answer, in the same order."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """The live view of a recording on a terminal, and what it remembers."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pty

@@ -1,7 +1,5 @@
 """The plant of the tests: its motion against closed forms, conservation laws and another derivation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """tools/analyse.py sees what it is there for: faults planted in a copy of the core are found, by the tool meant."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shutil

@@ -1,7 +1,5 @@
 """tools/bootstrap.sh and the lock file: folders in which nothing can be built, another user's clone, hashes."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

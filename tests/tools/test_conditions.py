@@ -3,8 +3,6 @@
 The door of the printed twin is the place for it. Elsewhere few conditions may be left.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The core's files depend on one another one way only: no circles, and no room uses one above it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from concurrent.futures import ThreadPoolExecutor

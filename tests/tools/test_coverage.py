@@ -1,7 +1,5 @@
 """The quick tests take 95 % of the core's branches."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

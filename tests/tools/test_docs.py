@@ -1,7 +1,5 @@
 """tools/docs.py finds what it is there for: faults planted in a copy of the pages are reported."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a tool reported is reported again while nothing that it read has changed, and only then."""
 
-from __future__ import annotations
-
 import sys
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """tools/loops.py sees what it is there for: loops that do not end, or not by what stands in them, and recursion."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

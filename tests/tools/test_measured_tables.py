@@ -1,7 +1,5 @@
 """No table of measured figures without the command that made it: beside the table, or in its page's introduction."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

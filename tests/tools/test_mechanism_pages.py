@@ -1,7 +1,5 @@
 """The pages of the shipped mechanisms have today's description and report; each has its picture."""
 
-from __future__ import annotations
-
 import pytest
 from conftest import ROOT
 

@@ -1,7 +1,5 @@
 """tools/mutate.py changes what it says and nothing else."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import sys

@@ -1,7 +1,5 @@
 """The notebooks run, cell by cell, and show what they show; the runner's outputs are those of a kernel."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

@@ -1,7 +1,5 @@
 """Every block of README.md and of the site is executed, or listed with a reason and parsed."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

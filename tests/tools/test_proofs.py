@@ -1,8 +1,6 @@
 """tools/prove.py says so when a module is not safe: a decoder that writes one byte too far, an encoder whose room is
 a byte short, a function that breaks the contract that others rely on."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

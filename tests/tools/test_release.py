@@ -1,7 +1,5 @@
 """tools/release refuses what is no release, and packs what is committed."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

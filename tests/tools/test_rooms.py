@@ -1,7 +1,5 @@
 """The packages of host/src/pvid stand in one order and import leftwards only; no circle of files."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter

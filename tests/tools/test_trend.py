@@ -1,7 +1,5 @@
 """The table beside the last version: costs of the core that both have, lines, processor time."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tomllib

@@ -1,7 +1,5 @@
 """The wheel: the package with its C core, installed into environments that have nothing of this clone."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The commissioning as printed has the bits of the compiled package, tick by tick: drives, states, result."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 from pathlib import Path

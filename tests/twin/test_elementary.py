@@ -1,7 +1,5 @@
 """The elementary functions of generated code: C and twin have the same bits, also of what is no angle or no number."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 import subprocess

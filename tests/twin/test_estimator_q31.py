@@ -1,7 +1,5 @@
 """The fixed-point estimator fed rows: sums that come near the end of an int64, forgetting, rows beyond the limit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

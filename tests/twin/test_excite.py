@@ -1,7 +1,5 @@
 """The excitation as printed has the bits of the compiled one: random tables, limits, guards and measurements."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rows of several kinds: M by blocks. C against twin bit for bit, both against float64."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

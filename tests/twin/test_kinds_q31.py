@@ -1,7 +1,5 @@
 """Rows of several kinds in fixed point: C against twin in every integer, both against float64."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Mapping
 from dataclasses import replace

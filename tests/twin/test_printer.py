@@ -1,7 +1,5 @@
 """The translator from C to numpy: C by C, compiled beside printed, and what it refuses."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Integrals since the start of a run that does not begin at rest: what came before the first step counts."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The refinement as the second stage of the weak identifier: bits of its twin, gaps, freezes, snapshots, refusals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 

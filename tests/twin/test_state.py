@@ -1,7 +1,5 @@
 """The state of the compiled core, taken over by the twin at any tick."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Bit equality of the weak identifier of any mechanism in C and its numpy twin, after every tick."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The fixed-point weak identifier of every shipped mechanism has the bits of its printed twin, after every tick."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
