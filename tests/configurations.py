@@ -123,12 +123,7 @@ TRUST = {
     "trust.revert_after": Range(0, 65535, Status.OK),
 }
 FORM = {"iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,))}
-WEAK = {
-    **RIG_FIELDS,
-    **ESTIMATOR,
-    **TRUST,
-    **FORM,
-}
+WEAK = {**RIG_FIELDS, **ESTIMATOR, **TRUST, **FORM}
 WEAK_Q31 = {
     **ESTIMATOR_Q31,
     **TRUST,
@@ -145,11 +140,7 @@ OWN = {
     "estimator.correlation": Range(1.0, 1e6, Status.BAD_CORRELATION),
     "estimator.row_weight": Range(1e-6, 1.0, Status.BAD_ROW_WEIGHT),
 }
-RANGES = {
-    "weak": WEAK,
-    "weak q31": WEAK_Q31,
-    "estimator": OWN,
-}
+RANGES = {"weak": WEAK, "weak q31": WEAK_Q31, "estimator": OWN}
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 WITHOUT = {"weights": Status.BAD_BANK, "model": Status.BAD_MODEL}
 SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}  # what a form's init fills in

@@ -196,10 +196,7 @@ PROOFS = (
     Proof(
         "trust_q31",
         "any configuration, four parameters and three; any group on top of any state that a group leaves",
-        (
-            *("src/judge/trust_q31.c", "src/judge/standing.c", "src/judge/publication.c"),
-            "src/number/integer_q31.c",
-        ),
+        (*("src/judge/trust_q31.c", "src/judge/standing.c", "src/judge/publication.c"), "src/number/integer_q31.c"),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
         taken=("pvid_square_root_q31",),
     ),
@@ -276,12 +273,7 @@ PROOFS = (
     Proof(
         "snapshot_q31",
         "any state of the weak form saved into any room, any bytes of any length restored; its pointers stay",
-        (
-            "src/persist/snapshot_weak_q31.c",
-            "src/persist/snapshot.c",
-            "src/persist/crc32.c",
-            "src/number/fnv.c",
-        ),
+        ("src/persist/snapshot_weak_q31.c", "src/persist/snapshot.c", "src/persist/crc32.c", "src/number/fnv.c"),
         ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
         taken=(*("pvid_fingerprint_weak_q31", "pvid_fingerprint_weak_model_q31", "pvid_fingerprint_weak_design_q31"),),
     ),
@@ -295,10 +287,7 @@ PROOFS = (
         "link",
         "the decoder, any number of any bytes",
         ("link/link.c", "src/persist/crc32.c"),
-        (
-            *("-eva-split-return", "full"),
-            *("-eva-slevel-function", "one_byte:20,pvid_link_decode:40,accept:40"),
-        ),
+        (*("-eva-split-return", "full"), *("-eva-slevel-function", "one_byte:20,pvid_link_decode:40,accept:40")),
     ),
     Proof(
         "encoder",
@@ -345,10 +334,7 @@ def weak_design(folder: Path) -> None:
     reach = re.search(r"limits\[\d+\] = (\{[^}]*\})", text)
     assert reach is not None, "the generated function refuses no input"
     sizes = {"PVID_MAX_P": 3}  # those of the proofs are the defaults
-    own = [
-        f"#define weak_design_q31 {name}_design_q31",
-        f"static const int32_t weak_reach[] = {reach[1]};",
-    ]
+    own = [f"#define weak_design_q31 {name}_design_q31", f"static const int32_t weak_reach[] = {reach[1]};"]
     files = {
         f"{name}_weak_q31.h": files_weak_q31.header(weak.made, sizes, made_by),
         f"{name}_design_q31.h": files_weak_q31.design_header(weak.config, name, sizes, made_by, []),

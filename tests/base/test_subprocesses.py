@@ -47,12 +47,7 @@ def logger(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(tmp_path / "rig.toml")
     command = [sys.executable, "-m", "pvid", "log", HOST_TARGET, "a.pvlog", "--rig", "rig.toml"]
     process = subprocess.Popen(
-        command,
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     until(lambda: samples_in(tmp_path / "a.pvlog") > 500 or process.poll() is not None)
     yield process

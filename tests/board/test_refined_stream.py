@@ -287,12 +287,7 @@ def test_figure_shows_both_curves_and_which_is_published(
 ) -> None:
     assert write_log_figure(log, mechanism_of_log(log), tmp_path / "b.svg")
     drawn = (tmp_path / "b.svg").read_text()
-    for words in (
-        "weak form",
-        "refined, published where drawn",
-        "published:",
-        board.names.refined[-1].name,
-    ):
+    for words in ("weak form", "refined, published where drawn", "published:", board.names.refined[-1].name):
         assert words in drawn, words
 
 

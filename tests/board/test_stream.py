@@ -99,11 +99,7 @@ def weak_board() -> MechanismBoard:
 
 
 def play_standard(
-    target: Target,
-    form: str,
-    core: str = "f32",
-    reopen: Callable[[], Target] | None = None,
-    patience_s: float = 30.0,
+    target: Target, form: str, core: str = "f32", reopen: Callable[[], Target] | None = None, patience_s: float = 30.0
 ) -> Playback:
     run = standard(form, core)
     return play(target, run.rig, *run.signals, reopen=reopen, patience_s=patience_s, resend_s=0.5)

@@ -51,8 +51,7 @@ def test_inertias_of_a_rigid_body_by_either_core(body: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "target",
-    ["mps2-an386", *(pytest.param(one, marks=pytest.mark.night) for one in ("microbit", "virt-rv32imac"))],
+    "target", ["mps2-an386", *(pytest.param(one, marks=pytest.mark.night) for one in ("microbit", "virt-rv32imac"))]
 )
 def test_the_board_has_the_hash_of_the_twin(body: Path, target: str) -> None:
     """With a floating-point unit and without: every operation of the generic path."""

@@ -13,12 +13,7 @@ from bench.figures import results_of
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31, sizes
 from pvid.board.boards import BOARDS, Board, run
-from pvid.board.replay_image import (
-    REPORT_EVERY,
-    ReplayReport,
-    parse_report,
-    play,
-)
+from pvid.board.replay_image import REPORT_EVERY, ReplayReport, parse_report, play
 from pvid.board.strong_image import hashes_of, standard_run
 from pvid.board.weak_image import weak_image
 from pvid.codegen.strong_twin import StrongModelTwin

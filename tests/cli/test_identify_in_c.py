@@ -87,8 +87,7 @@ def core(recorded: dict[str, Path]) -> CoreAnswer:
 
 
 @pytest.mark.parametrize(
-    ("name", "arithmetic"),
-    [("rigid_body", "f32"), ("dc_motor", "f32"), ("dc_motor", "q31"), ("free_pendulum", "f32")],
+    ("name", "arithmetic"), [("rigid_body", "f32"), ("dc_motor", "f32"), ("dc_motor", "q31"), ("free_pendulum", "f32")]
 )
 def test_the_core_identifies_a_recording_as_the_oracle_does(name: str, arithmetic: str, answers: Answers) -> None:
     core = answers(name, "--core", arithmetic)

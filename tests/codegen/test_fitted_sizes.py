@@ -15,13 +15,7 @@ from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak_library import weak_native, weak_sources_q31
-from pvid.codegen.weak_stages import (
-    column_stages,
-    column_stages_q31,
-    shares_place,
-    shares_place_q31,
-    window_stages,
-)
+from pvid.codegen.weak_stages import column_stages, column_stages_q31, shares_place, shares_place_q31, window_stages
 from pvid.configuration.weak import config_for_recording, samples_of
 from pvid.core.model_library import ModelSources
 from pvid.core.weak_native import WeakNative

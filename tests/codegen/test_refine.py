@@ -28,15 +28,7 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.cores import FLOAT
 from pvid.twin.printer.program import printed_module
 
-WARNINGS = (
-    "-Werror",
-    "-Wall",
-    "-Wextra",
-    "-Wpedantic",
-    "-Wconversion",
-    "-Wdouble-promotion",
-    "-Wshadow",
-)
+WARNINGS = ("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow")
 VECTORS, PRINTED = 200, 40  # PRINTED: of the twin
 # Names, and options of the refinement behind them.
 NAMES = (*KINDS, "kapitza slant", "kapitza dry_friction slant")
@@ -61,10 +53,7 @@ def given_of(name: str) -> Given:
     r = np.array(near)[:, None] * share + np.where(np.array(near) == 0, 1e-2, 0)[:, None] * rng.normal(size=share.shape)
     n = len(made.coordinates)
     v = rng.uniform(-3, 3, (n if made.order == 2 else 0, VECTORS))
-    q, u = (
-        rng.uniform(-2, 2, (n, VECTORS)),
-        rng.uniform(-5, 5, (len(made.inputs), VECTORS)),
-    )
+    q, u = (rng.uniform(-2, 2, (n, VECTORS)), rng.uniform(-5, 5, (len(made.inputs), VECTORS)))
     return {key: value.astype(np.float32) for key, value in dict(r=r, q=q, v=v, u=u).items()}
 
 
@@ -112,25 +101,9 @@ class InC:
         (folder / "refine_model_f32.h").write_text(files_refine.header(made, "test"), encoding="utf-8")
         (folder / "each.c").write_text(wrapped(made), encoding="utf-8")
         library = folder / "each.so"
-        flags = (
-            "-std=c99",
-            "-O2",
-            "-ffp-contract=off",
-            *WARNINGS,
-            "-shared",
-            "-fPIC",
-        )
+        flags = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, "-shared", "-fPIC")
         sources = [str(folder / "each.c"), str(source("elementary_f32.c"))]
-        command = [
-            host_compiler("a test"),
-            *flags,
-            f"-I{folder}",
-            *INCLUDES,
-            *sources,
-            "-o",
-            str(library),
-            "-lm",
-        ]
+        command = [host_compiler("a test"), *flags, f"-I{folder}", *INCLUDES, *sources, "-o", str(library), "-lm"]
         subprocess.run(command, check=True)
         self.library = ctypes.CDLL(str(library))
 
@@ -245,25 +218,11 @@ def test_derivatives_are_those_of_finite_differences(name: str) -> None:
         return evaluated(made, function, {**at, "m": m})
 
     names = [key for one in ("jacobian", "output_jacobian") for key, _ in made.functions[one].written]
-    base = dict(
-        zip(
-            names,
-            [*values("jacobian", inner), *values("output_jacobian", inner)],
-            strict=True,
-        )
-    )
+    base = dict(zip(names, [*values("jacobian", inner), *values("output_jacobian", inner)], strict=True))
     np.testing.assert_allclose(base["a"], values("motion", inner)[0], rtol=1e-12, atol=1e-12)
-    rows, moving = (
-        {"motion": len(made.coordinates), "output": len(made.outputs)},
-        made.moving - made.skew,
-    )
+    rows, moving = ({"motion": len(made.coordinates), "output": len(made.outputs)}, made.moving - made.skew)
     for function, key, got in (
-        *(
-            ("motion", "q", "K"),
-            ("motion", "v", "D"),
-            ("motion", "u", "U"),
-            ("motion", "r", "B"),
-        ),
+        *(("motion", "q", "K"), ("motion", "v", "D"), ("motion", "u", "U"), ("motion", "r", "B")),
         *(("output", "q", "Zq"), ("output", "v", "Zv"), ("output", "r", "Zr")),
     ):
         entries = [k for k in range(len(inner[key])) if key != "r" or not made.skew or k != moving]

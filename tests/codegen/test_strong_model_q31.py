@@ -56,10 +56,7 @@ def wild(counts: Int32, window: int, seed: int) -> Int32:
     ticks, signals = out.shape
     largest = np.abs(counts).max(axis=0)
     for place in range(window, ticks, window // 2):
-        part, one = (
-            slice(place, place + int(random.integers(1, window // 3))),
-            int(random.integers(signals)),
-        )
+        part, one = (slice(place, place + int(random.integers(1, window // 3))), int(random.integers(signals)))
         kind = int(random.integers(7))
         if kind == 0:
             out[part, one] = out[place, one]
@@ -81,10 +78,7 @@ def wild(counts: Int32, window: int, seed: int) -> Int32:
 def difference(core: Record, twin: Record) -> str:
     for name in ("reason", "p", "sums", "exponent"):
         ticks = np.nonzero(
-            np.any(
-                np.atleast_2d(getattr(core, name) != getattr(twin, name)).reshape(len(core.p), -1),
-                1,
-            )
+            np.any(np.atleast_2d(getattr(core, name) != getattr(twin, name)).reshape(len(core.p), -1), 1)
         )
         if len(ticks[0]):
             return f"{name} at tick {ticks[0][0]}"
@@ -98,13 +92,7 @@ def difference(core: Record, twin: Record) -> str:
         "dc_motor",
         *(
             pytest.param(one, marks=pytest.mark.long)
-            for one in (
-                "kapitza",
-                "cart_pendulum",
-                "two_link_arm",
-                "furuta",
-                "two_mass_drive",
-            )
+            for one in ("kapitza", "cart_pendulum", "two_link_arm", "furuta", "two_mass_drive")
         ),
     ],
 )
@@ -116,10 +104,7 @@ def test_c_has_the_bits_of_its_twin_whatever_the_sensors_do(name: str) -> None:
     seen: set[int] = set()
     hashed = fnv.START
     for part, (first, last) in enumerate(zip(cuts, cuts[1:], strict=False)):
-        core, own = (
-            identifier.run_samples(readings[first:last]),
-            twin.run(readings[first:last]),
-        )
+        core, own = (identifier.run_samples(readings[first:last]), twin.run(readings[first:last]))
         assert difference(core, own) == ""
         hashed = int(fnv.running_hashes(own, hashed)[-1])
         assert identifier.running_hash == hashed
@@ -129,18 +114,9 @@ def test_c_has_the_bits_of_its_twin_whatever_the_sensors_do(name: str) -> None:
             twin.gap()
         identifier.freeze(part == 2)
         twin.freeze(part == 2)
-    wanted = {
-        Reason.UPDATED,
-        Reason.WARMING_UP,
-        Reason.ACCUMULATED,
-        Reason.REJECTED_SATURATED,
-        Reason.HELD_FROZEN,
-    }
+    wanted = {Reason.UPDATED, Reason.WARMING_UP, Reason.ACCUMULATED, Reason.REJECTED_SATURATED, Reason.HELD_FROZEN}
     assert wanted <= seen
-    lower, upper = (
-        design.strong_q31.config.estimator.lower,
-        design.strong_q31.config.estimator.upper,
-    )
+    lower, upper = (design.strong_q31.config.estimator.lower, design.strong_q31.config.estimator.upper)
     assert np.all((core.p >= lower) & (core.p <= upper))
 
 

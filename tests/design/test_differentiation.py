@@ -132,12 +132,7 @@ def test_finite_differences_converge_at_their_order() -> None:
     np.testing.assert_allclose(ratio, [16.0, 16.0, 4.0, 4.0], rtol=0.02)
 
 
-@given(
-    half=st.integers(6, 60),
-    degree=st.integers(4, 12),
-    stride=st.integers(1, 5),
-    rate=st.floats(1.0, 1e4),
-)
+@given(half=st.integers(6, 60), degree=st.integers(4, 12), stride=st.integers(1, 5), rate=st.floats(1.0, 1e4))
 @settings(max_examples=40)
 def test_stride_and_rate_only_scale_time(half: int, degree: int, stride: int, rate: float) -> None:
     bank = savitzky_golay(2 * half + 1, degree, stride)

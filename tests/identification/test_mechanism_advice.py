@@ -56,10 +56,7 @@ class Case:
 
 def _spring() -> Case:
     model = Model("cart on a spring")
-    F, x = (
-        model.input("F", "N", hold="zoh", reach=10, gain_sd=0),
-        model.sensor("x", "m", resolution=1e-5, reach=0.2),
-    )
+    F, x = (model.input("F", "N", hold="zoh", reach=10, gain_sd=0), model.sensor("x", "m", resolution=1e-5, reach=0.2))
     m, c, k = model.unknown("m", "kg", 1.0), model.unknown("c", "N*s/m", 1.5), model.unknown("k", "N/m", 100.0)
     model.equation(m * x.d(2) + c * x.d() + k * x - F)
 
@@ -72,10 +69,7 @@ def _spring() -> Case:
 def _pendulum() -> Case:
     model = Model("pendulum with a motor")
     lsb = 2 * np.pi / 4096
-    u, q = (
-        model.input("u", "N*m", hold="zoh", reach=5, gain_sd=0),
-        model.sensor("q", "rad", resolution=lsb, reach=4),
-    )
+    u, q = (model.input("u", "N*m", hold="zoh", reach=5, gain_sd=0), model.sensor("q", "rad", resolution=lsb, reach=4))
     J, G, b = model.unknown("J", "kg*m^2", 0.15), model.unknown("G", "N*m", 3.0), model.unknown("b", "N*m*s", 0.1)
     model.equation(J * q.d(2) + G * sin(q) + b * q.d() - u)
 
@@ -136,12 +130,7 @@ def _counts(lsb: float) -> Callable[[Float], Float]:
         ("pendulum", "u", lambda x: -x, "u seems to have the opposite sign: --columns u=u:-1 (or q: --columns q=q:-1)"),
         ("pendulum", "q", np.degrees, "q seems to be in deg, not rad: --columns q=q:deg"),
         ("pendulum", "q", lambda x: x / (2 * np.pi), "q seems to be in rev, not rad: --columns q=q:rev"),
-        (
-            "pendulum",
-            "q",
-            _counts(2 * np.pi / 4096),
-            "q seems to be in counts, not rad: --columns q=q:0.00153398079",
-        ),
+        ("pendulum", "q", _counts(2 * np.pi / 4096), "q seems to be in counts, not rad: --columns q=q:0.00153398079"),
         ("vehicle", "F", lambda x: -x, "F seems to have the opposite sign: --columns F=F:-1 (or v: --columns v=v:-1)"),
     ],
 )

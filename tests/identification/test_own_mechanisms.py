@@ -109,11 +109,7 @@ def drag_model() -> CompiledModel:
     model = Model("body in water")
     u = model.input("u", "N*m", hold="zoh", reach=1, gain_sd=0)
     a = model.sensor("a", "rad", resolution=2 * np.pi / 2**12, reach=2)
-    J, D, G = (
-        model.unknown("J", "kg*m^2", 0.02),
-        model.unknown("D", "kg*m^2", 0.01),
-        model.unknown("G", "N*m", 1.0),
-    )
+    J, D, G = (model.unknown("J", "kg*m^2", 0.02), model.unknown("D", "kg*m^2", 0.01), model.unknown("G", "N*m", 1.0))
     model.equation(J * a.d(2) + D * abs(a.d()) * a.d() + G * a - u)
     return model.compiled("water")
 

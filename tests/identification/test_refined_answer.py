@@ -59,8 +59,7 @@ EXTRAS = {
 
 
 @pytest.mark.parametrize(
-    ("name", "lacking"),
-    [("isolator", "c"), ("free_pendulum", "w2"), *((name, "") for name in EXTRAS)],
+    ("name", "lacking"), [("isolator", "c"), ("free_pendulum", "w2"), *((name, "") for name in EXTRAS)]
 )
 def test_what_a_refinement_determines_is_identified(name: str, lacking: str) -> None:
     """Though the weak form does not, one parameter or all, and of the reasons none is left that it does not."""

@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 
-from pvid.codegen.refine import (
-    is_driven_by_derivatives,
-    refine_functions_of,
-    without_optional,
-)
+from pvid.codegen.refine import is_driven_by_derivatives, refine_functions_of, without_optional
 from pvid.identification.refinement import kernel_text
 from pvid.identification.refinement.kernel_text import printed
 from pvid.identification.refinement.spline import Spline
@@ -52,10 +48,7 @@ def test_another_model_has_a_text_of_its_own(cache: Path) -> None:
     assert len(list(cache.iterdir())) == 3
 
 
-@pytest.mark.parametrize(
-    "damaged",
-    ["", "[1]", json.dumps({"made": {}, "code": ""}), '{"made": {"inputs": 3}}'],
-)
+@pytest.mark.parametrize("damaged", ["", "[1]", json.dumps({"made": {}, "code": ""}), '{"made": {"inputs": 3}}'])
 def test_a_damaged_text_is_printed_again(damaged: str, cache: Path) -> None:
     first = printed(MOTOR)
     (place,) = cache.iterdir()

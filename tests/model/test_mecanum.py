@@ -2,14 +2,7 @@
 
 import numpy as np
 import sympy as sp
-from sympy.physics.mechanics import (
-    KanesMethod,
-    Point,
-    ReferenceFrame,
-    RigidBody,
-    dynamicsymbols,
-    inertia,
-)
+from sympy.physics.mechanics import KanesMethod, Point, ReferenceFrame, RigidBody, dynamicsymbols, inertia
 
 from pvid.model.signals import sgn
 from pvid.models.mechanisms import compiled_of

@@ -31,11 +31,7 @@ def pendulum() -> CompiledModel:
     model = Model("driven pendulum")
     u = model.input("u", "N*m", hold="zoh", reach=10, gain_sd=0)
     q = model.sensor("q", "rad", resolution=LSB, reach=4)
-    J, G, b = (
-        model.unknown("J", "kg*m^2", 0.15),
-        model.unknown("G", "N*m", 3.0),
-        model.unknown("b", "N*m*s", 0.05),
-    )
+    J, G, b = (model.unknown("J", "kg*m^2", 0.15), model.unknown("G", "N*m", 3.0), model.unknown("b", "N*m*s", 0.05))
     model.equation(J * q.d(2) + G * sin(q) + b * q.d() - u)
     return model.compiled("pendulum")
 

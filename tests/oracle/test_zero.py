@@ -104,19 +104,7 @@ def test_what_the_run_does_not_determine_is_named_and_the_others_are_published()
     assert (off < 4).all()
 
 
-@pytest.mark.parametrize(
-    ("bounds", "at"),
-    [
-        ({"low": 0.5, "high": 1.1}, 1.1),
-        (
-            {
-                "low": 1.6,
-                "high": 5,
-            },
-            1.6,
-        ),
-    ],
-)
+@pytest.mark.parametrize(("bounds", "at"), [({"low": 0.5, "high": 1.1}, 1.1), ({"low": 1.6, "high": 5}, 1.6)])
 def test_the_search_stays_between_low_and_high(bounds: dict[str, float], at: float) -> None:
     model = cart(None, **bounds) if bounds["low"] < 1 else _with_guess(bounds)
     found = identify(model, run(0), RATE, design=DESIGN)

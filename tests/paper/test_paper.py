@@ -37,11 +37,7 @@ ON_BOARDS = [
     for name, board in BOARDS.items()
     if name != "atmega328p" and (core == "q31" or board.toolchain != "avr")
 ]
-COMPILERS = {
-    "gcc -O3": ("gcc", "-O3", "-march=native"),
-    "gcc -Os": ("gcc", "-Os"),
-    "clang": ("clang", "-O2"),
-}
+COMPILERS = {"gcc -O3": ("gcc", "-O3", "-march=native"), "gcc -Os": ("gcc", "-Os"), "clang": ("clang", "-O2")}
 
 
 @cache

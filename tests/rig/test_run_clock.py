@@ -322,10 +322,7 @@ STRETCHED = uniform(1.0) + 5e-5 * np.sin(np.arange(1000))  # a twentieth of a pe
             "line 3, column t: 0.998 s runs back from the time before it, 0.999 s, as at 998 more rows",
         ),
         (np.zeros(100), "line 3, column t: 0.0 s repeats the time before it, as all times do"),
-        (
-            np.sort(np.append(STRETCHED, STRETCHED[500])),
-            "line 503, column t: 0.49.* s repeats the time before it",
-        ),
+        (np.sort(np.append(STRETCHED, STRETCHED[500])), "line 503, column t: 0.49.* s repeats the time before it"),
         (np.array([0.0, 1.0, 2.0, 1e308, 1.1e308]), "too far from the first time"),
         (np.array([-1e308, 0.0, 1.0, 2.0, 1e308]), "too far from the first time"),
     ],

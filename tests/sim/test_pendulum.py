@@ -5,16 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 import pytest
-from pendulum_plant import (
-    STANDARD_DRIVE,
-    STANDARD_PENDULUM,
-    STANDARD_RELEASE,
-    Pendulum,
-    Sensors,
-    Tone,
-    Truth,
-    simulate,
-)
+from pendulum_plant import STANDARD_DRIVE, STANDARD_PENDULUM, STANDARD_RELEASE, Pendulum, Sensors, Tone, Truth, simulate
 from scipy.integrate import solve_ivp
 
 Float = npt.NDArray[np.float64]
@@ -53,18 +44,8 @@ def reference(pendulum: Pendulum, tones: tuple[Tone, ...], truth: str, end: floa
         # Unknowns: a1'', a2'' and T per unit mass.
         s1, c1, s2, c2 = math.sin(a1), math.cos(a1), math.sin(a2), math.cos(a2)
         # Centre of mass at (l1 sin a1 + l2 sin a2, -l1 cos a1 - l2 cos a2), force on it T (-sin a1, cos a1).
-        matrix = np.array(
-            [
-                [l1 * c1, l2 * c2, s1],
-                [l1 * s1, l2 * s2, -c1],
-                [0.0, rho2**2, l2 * (s2 * c1 - c2 * s1)],
-            ]
-        )
-        right = [
-            l1 * s1 * v1**2 + l2 * s2 * v2**2,
-            -l1 * c1 * v1**2 - l2 * c2 * v2**2 - gravity,
-            0.0,
-        ]
+        matrix = np.array([[l1 * c1, l2 * c2, s1], [l1 * s1, l2 * s2, -c1], [0.0, rho2**2, l2 * (s2 * c1 - c2 * s1)]])
+        right = [l1 * s1 * v1**2 + l2 * s2 * v2**2, -l1 * c1 * v1**2 - l2 * c2 * v2**2 - gravity, 0.0]
         a = np.linalg.solve(matrix, right)
         return [v1, v2, float(a[0]), float(a[1])]
 

@@ -66,13 +66,7 @@ def test_a_change_in_no_section_is_refused_by_its_file(project: Path) -> None:
         release.check_changes(project)
 
 
-@pytest.mark.parametrize(
-    ("name", "old", "new"),
-    [
-        (PACKAGE, "1.2.3", "1.2.4"),
-        (CHANGELOG, "## 1.2.3", "## 1.3.0"),
-    ],
-)
+@pytest.mark.parametrize(("name", "old", "new"), [(PACKAGE, "1.2.3", "1.2.4"), (CHANGELOG, "## 1.2.3", "## 1.3.0")])
 def test_another_version_is_refused_by_its_file(name: str, old: str, new: str, project: Path) -> None:
     replace(project / name, old, new)
     with pytest.raises(release.RefusalError, match=re.escape(name)) as refused:

@@ -21,28 +21,9 @@ from pvid.twin.printer.program import printed_module
 
 Float32 = npt.NDArray[np.float32]
 CALLS = ("start", "step", "work", "abort", "result_of")
-RESULT = (
-    "verdict",
-    "reason",
-    "drive",
-    "guard",
-    "parameter",
-    "difference",
-    "restrained",
-)
+RESULT = ("verdict", "reason", "drive", "guard", "parameter", "difference", "restrained")
 LISTS = ("value", "error", "check", "misfit", "outcome")
-OF_A_GUARD = (
-    "signal",
-    "of_rate",
-    "low",
-    "soft_low",
-    "soft_high",
-    "high",
-    "response",
-    "push",
-    "ahead_s",
-    "brake",
-)
+OF_A_GUARD = ("signal", "of_rate", "low", "soft_low", "soft_high", "high", "response", "push", "ahead_s", "brake")
 
 READ = """
 #include <string.h>
@@ -86,36 +67,14 @@ class Package:
         recording = self.excitation.recording
         config = config_for_recording(plate.compiled, recording, reversals="decided")
         self.made: Deployment = deployment_f32(
-            plate.compiled,
-            config,
-            recording.signals,
-            "a test",
-            excitation=self.excitation,
+            plate.compiled, config, recording.signals, "a test", excitation=self.excitation
         )
         write_package(self.made, "cmake", folder / "p")
         self.sources = sorted((folder / "p" / "src").rglob("*.c"))
         self.headers = folder / "p" / "src"
         (folder / "read.c").write_text(READ.format(name=self.made.name), encoding="utf-8")
-        options = (
-            "-std=c99",
-            "-O2",
-            "-shared",
-            "-fPIC",
-            "-ffp-contract=off",
-            f"-I{self.headers}",
-        )
-        subprocess.run(
-            [
-                "gcc",
-                *options,
-                folder / "read.c",
-                *self.sources,
-                "-lm",
-                "-o",
-                folder / "it.so",
-            ],
-            check=True,
-        )
+        options = ("-std=c99", "-O2", "-shared", "-fPIC", "-ffp-contract=off", f"-I{self.headers}")
+        subprocess.run(["gcc", *options, folder / "read.c", *self.sources, "-lm", "-o", folder / "it.so"], check=True)
         self.c = ctypes.CDLL(str(folder / "it.so"))
 
     def call(self, what: str, *given: Any) -> int:
@@ -140,12 +99,7 @@ class Package:
             sample[signals.index("T")] = np.nan if len(states) == fault else x
             if len(states) == aborted:
                 self.call("abort")
-            states.append(
-                self.call(
-                    "step",
-                    *(one.ctypes.data_as(ctypes.c_void_p) for one in (sample, drive)),
-                )
-            )
+            states.append(self.call("step", *(one.ctypes.data_as(ctypes.c_void_p) for one in (sample, drive))))
             while self.call("work"):
                 pass
             motion.append(np.append(sample, drive))
@@ -162,17 +116,9 @@ class Package:
     def twin(self) -> Any:
         """The printed module of the package's own files."""
         whole = [one for one in self.sources if not one.stem.endswith(("_commission", "_identifier"))]
-        roots = [
-            *(f"pvid_commission_{one}_f32" for one in CALLS),
-            "pvid_commission_init_f32",
-            "the_config",
-        ]
+        roots = [*(f"pvid_commission_{one}_f32" for one in CALLS), "pvid_commission_init_f32", "the_config"]
         return printed_module(
-            whole,
-            [self.headers],
-            {},
-            roots,
-            {"the_config.c": THE_CONFIG.format(name=self.made.name)},
+            whole, [self.headers], {}, roots, {"the_config.c": THE_CONFIG.format(name=self.made.name)}
         )
 
 
@@ -183,29 +129,13 @@ def ready(module: Any, e: Excitation, samples: int) -> Any:
     config.excite, config.excitation, config.input = [], [], []
     for one in e.drives:
         drive = module.pvid_excite_config_f32()
-        drive.sample_rate_hz, drive.low, drive.high = (
-            f32(e.sample_rate),
-            f32(-one.limit),
-            f32(one.limit),
-        )
-        drive.slew, drive.ramp_s, drive.burst_s = (
-            f32(one.slew),
-            f32(e.ramp_s),
-            f32(e.burst_s),
-        )
-        drive.parts, drive.guards, drive.measured = (
-            len(one.tones),
-            len(one.guards),
-            samples,
-        )
+        drive.sample_rate_hz, drive.low, drive.high = (f32(e.sample_rate), f32(-one.limit), f32(one.limit))
+        drive.slew, drive.ramp_s, drive.burst_s = (f32(one.slew), f32(e.ramp_s), f32(e.burst_s))
+        drive.parts, drive.guards, drive.measured = (len(one.tones), len(one.guards), samples)
         drive.part, drive.guard = [], []
         for tone in one.tones:
             part = module.pvid_excite_part_f32()
-            part.amplitude, part.hz, part.turns = (
-                f32(tone.amplitude),
-                f32(tone.hz),
-                f32(tone.turns),
-            )
+            part.amplitude, part.hz, part.turns = (f32(tone.amplitude), f32(tone.hz), f32(tone.turns))
             drive.part.append(part)
         for own in one.guards:
             guard = module.pvid_excite_guard_f32()
@@ -241,13 +171,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Package:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scale", "fault", "aborted", "verdict"),
-    [
-        (0.4, -1, -1, 1),
-        (0.1, -1, -1, 1),
-        (1.3, -1, -1, 3),
-        (0.7, -1, 500, 2),
-        (1.0, 400, -1, 2),
-    ],
+    [(0.4, -1, -1, 1), (0.1, -1, -1, 1), (1.3, -1, -1, 3), (0.7, -1, 500, 2), (1.0, 400, -1, 2)],
 )
 def test_drives_states_and_result_have_the_same_bits(
     scale: float, fault: int, aborted: int, verdict: int, package: Package

@@ -226,7 +226,7 @@ def of_missing() -> list[str]:
     lines = [
         f"- Table of effects: wrong without a warning are {silent} of {effects} recordings with an effect ({without} "
         f"without the model's part of the s.e.); warned are {warned} of {clean} without one. Named rightly are {right} "
-        f"of {off} that are more than 2 % off, wrongly {wrong}. Two s.e. contain {inside} % of the parameters.",
+        f"of {off} that are more than 2 % off, wrongly {wrong}. Two s.e. contain {inside} % of the parameters."
     ]
     for name in CAMPAIGNS:
         (row,) = results_of(name).where(plant="all")

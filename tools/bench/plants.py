@@ -191,11 +191,7 @@ def _cart_model() -> CompiledModel:
         model.input("F", "N", hold="zoh", reach=12, gain_sd=0),
         model.sensor("x", "m", resolution=1e-5, reach=0.5, gain_sd=0),
     )
-    m, c, k = (
-        model.unknown("m", "kg", 1),
-        model.unknown("c", "N*s/m", 1),
-        model.unknown("k", "N/m", 60),
-    )
+    m, c, k = (model.unknown("m", "kg", 1), model.unknown("c", "N*s/m", 1), model.unknown("k", "N/m", 60))
     x0 = model.unknown("x0", "m", 0, positive=False, sd=0.05)
     model.equation(m * x.d(2) + c * x.d() + k * (x - x0) - F)
     return model.compiled("cart")
@@ -213,10 +209,7 @@ def _stage_model() -> CompiledModel:
         model.sensor("x", "m", resolution=2e-6, reach=2, gain_sd=0),
     )
     m, c = model.unknown("m", "kg", 1), model.unknown("c", "N*s/m", 3)
-    Fc, o = (
-        model.unknown("Fc", "N", 1),
-        model.unknown("o", "N", 0, positive=False, sd=1),
-    )
+    Fc, o = (model.unknown("Fc", "N", 1), model.unknown("o", "N", 0, positive=False, sd=1))
     model.equation(m * x.d(2) + c * x.d() + Fc * sign_of(x.d()) + o - F)
     return model.compiled("stage")
 
@@ -232,11 +225,7 @@ def _motor_model() -> CompiledModel:
     V = model.input("V", "V", hold="zoh", reach=15, gain_sd=0)
     i = model.sensor("i", "A", resolution=2e-3, reach=15, gain_sd=0)
     w = model.sensor("w", "rad/s", resolution=0.02, reach=500, gain_sd=0)
-    R, L, k = (
-        model.unknown("R", "ohm", 1),
-        model.unknown("L", "H", 5e-3),
-        model.unknown("k", "N*m/A", 0.03),
-    )
+    R, L, k = (model.unknown("R", "ohm", 1), model.unknown("L", "H", 5e-3), model.unknown("k", "N*m/A", 0.03))
     J, b = model.unknown("J", "kg*m^2", 2e-4), model.unknown("b", "N*m*s/rad", 2e-4)
     model.equation(L * i.d() + R * i + k * w - V)
     model.equation(J * w.d() + b * w - k * i)
@@ -255,11 +244,7 @@ def _servo_model() -> CompiledModel:
     i = model.sensor("i", "A", resolution=4e-3, reach=20, gain_sd=0)
     q = model.sensor("q", "rad", resolution=2 * pi / 2**14, reach=1000)
     R, k = model.unknown("R", "ohm", 2), model.unknown("k", "N*m/A", 0.1)
-    J, b, Tc = (
-        model.unknown("J", "kg*m^2", 1e-3),
-        model.unknown("b", "N*m*s", 2e-3),
-        model.unknown("Tc", "N*m", 0.02),
-    )
+    J, b, Tc = (model.unknown("J", "kg*m^2", 1e-3), model.unknown("b", "N*m*s", 2e-3), model.unknown("Tc", "N*m", 0.02))
     model.equation(R * i + k * q.d() - V)
     model.equation(J * q.d(2) + b * q.d() + Tc * sign_of(q.d()) - k * i)
     return model.compiled("servo")
@@ -279,11 +264,7 @@ def _pendulum_model() -> CompiledModel:
     model = Model("pendulum")
     M = model.input("M", "N*m", hold="zoh", reach=3, gain_sd=0)
     q = model.sensor("q", "rad", resolution=2e-4, reach=3)
-    J, b, G = (
-        model.unknown("J", "kg*m^2", 0.05),
-        model.unknown("b", "N*m*s", 0.02),
-        model.unknown("G", "N*m", 1),
-    )
+    J, b, G = (model.unknown("J", "kg*m^2", 0.05), model.unknown("b", "N*m*s", 0.02), model.unknown("G", "N*m", 1))
     model.equation(J * q.d(2) + b * q.d() + G * sine_of(q) - M)
     return model.compiled("pendulum")
 
@@ -388,12 +369,7 @@ def _shaft_model() -> CompiledModel:
 def _shaft(s: States, M: float, more: States, p: Values) -> States:
     q, r, dq, dr = s[:4]
     shaft = p["k"] * (q - r) + p["d"] * (dq - dr)
-    return (
-        dq,
-        dr,
-        (M - p["b1"] * dq - shaft - more[0]) / p["J1"],
-        (shaft - p["b2"] * dr - more[1]) / p["J2"],
-    )
+    return (dq, dr, (M - p["b1"] * dq - shaft - more[0]) / p["J1"], (shaft - p["b2"] * dr - more[1]) / p["J2"])
 
 
 @cache
@@ -558,10 +534,7 @@ PLANTS = {
             4,
             {"q": (0, 2 * pi / 2**16), "r": (1, 2 * pi / 2**16)},
             2.0,
-            (
-                Axis("q", 0, 1.0, 0, 2, angle=True, viscous="b1"),
-                Axis("r", 1, 0.5, 1, 3, angle=True, viscous="b2"),
-            ),
+            (Axis("q", 0, 1.0, 0, 2, angle=True, viscous="b1"), Axis("r", 1, 0.5, 1, 3, angle=True, viscous="b2")),
         ),
         Plant(
             "cell",

@@ -229,10 +229,7 @@ def build_with(
     folder = BUILD / "runs" / whole
     for file, text in files.items():
         keep_header((folder / file).parent, Path(file).name, text)
-    options = {
-        "PVID_REPLAY_RUN": str(folder),
-        "PVID_LEAVE_OUT": left_out(room, core, *(["refine"] if refined else [])),
-    }
+    options = {"PVID_REPLAY_RUN": str(folder), "PVID_LEAVE_OUT": left_out(room, core, *(["refine"] if refined else []))}
     if refined:
         options["PVID_REFINE_MODEL"] = str(folder)
     options |= {macro: str(size) for macro, size in smallest(sizes).items()} | dict(choices or {})

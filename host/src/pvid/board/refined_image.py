@@ -11,14 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
-from pvid.board.mechanism_image import (
-    MADE_BY,
-    MechanismRun,
-    build_with,
-    files_of,
-    measured_from,
-    mechanism_run,
-)
+from pvid.board.mechanism_image import MADE_BY, MechanismRun, build_with, files_of, measured_from, mechanism_run
 from pvid.codegen import files_refine
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.refine import RefineFunctions, refine_functions

@@ -69,10 +69,7 @@ WITH_REFINEMENT = ("microbit", "mps2-an385", "mps2-an386")
 CONFIGURATIONS = tuple(
     Configuration(board, form, core)
     for board in BOARDS.values()
-    for form, core in (
-        *ON_AVR.get(board.name, ALL),
-        *([(REFINED, "f32")] if board.name in WITH_REFINEMENT else []),
-    )
+    for form, core in (*ON_AVR.get(board.name, ALL), *([(REFINED, "f32")] if board.name in WITH_REFINEMENT else []))
 )
 
 
@@ -212,13 +209,7 @@ def configurations_on(boards: Sequence[Board], models: Sequence[str], core: str 
 def as_json(footprints: Mapping[Configuration, Footprint]) -> list[dict[str, object]]:
     """The list of `sizes --json`."""
     return [
-        {
-            "target": one.board.name,
-            "model": one.model,
-            "form": one.form,
-            "core": one.core,
-            **figures_of(found),
-        }
+        {"target": one.board.name, "model": one.model, "form": one.form, "core": one.core, **figures_of(found)}
         for one, found in footprints.items()
     ]
 

@@ -24,19 +24,7 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.stream_image import Streamed, build_image, settings_number
 from pvid.core.native import Native
-from pvid.link.frames import (
-    Code,
-    Counters,
-    Credit,
-    Decoder,
-    Estimate,
-    EstimateQ31,
-    Frame,
-    Hash,
-    Hello,
-    Message,
-    encode,
-)
+from pvid.link.frames import Code, Counters, Credit, Decoder, Estimate, EstimateQ31, Frame, Hash, Hello, Message, encode
 from pvid.link.frames import Status as BoardStatus
 from pvid.link.port import Port, open_port
 from pvid.settings.enums import Status
@@ -497,11 +485,7 @@ def targets_of(names: tuple[str, ...]) -> list[str]:
 
 
 def verify(
-    name: str,
-    rig: PlayedBoard,
-    native: Native,
-    *signals: npt.ArrayLike,
-    progress: Callable[[int], None] | None = None,
+    name: str, rig: PlayedBoard, native: Native, *signals: npt.ArrayLike, progress: Callable[[int], None] | None = None
 ) -> Verdict:
     """Plays a run on a target, an emulator being started again should it die, and judges it by the host's core.
 

@@ -60,11 +60,7 @@ class Comparison:
 
 
 def first_difference(
-    core: Record,
-    twin: Record,
-    p_names: Sequence[str],
-    moments: int = 0,
-    layout: tuple[int, int] | None = None,
+    core: Record, twin: Record, p_names: Sequence[str], moments: int = 0, layout: tuple[int, int] | None = None
 ) -> Difference | None:
     """The first difference between a replay of the core and a lane of its twin: p, sums, status, published p.
 

@@ -41,10 +41,7 @@ def amalgamated(d: Deployment) -> tuple[str, str]:
     own = f"{d.name}_identifier.h"
     header = [files[name] for name in (*_IN_HEADER, own)]
     top = f"/* {d.library}.h and {d.library}.c: pvid in two files, with its licence in LICENSE.\n *\n * {d.banner} */\n"
-    source = [
-        top,
-        f'#include "{d.library}.h"\n',
-    ]
+    source = [top, f'#include "{d.library}.h"\n']
     parts = _parts(files)
     done = {*_IN_HEADER, own, *parts}
     commission = [_inlined(f"{d.name}_commission.h", files, done)] if d.excitation is not None else []

@@ -20,10 +20,7 @@ def commission_files(d: Deployment) -> Files:
     """Name -> text; none without an excitation."""
     if d.excitation is None:
         return {}
-    return {
-        f"{d.name}_commission.h": _header(d, d.excitation),
-        f"{d.name}_commission.c": _source(d, d.excitation),
-    }
+    return {f"{d.name}_commission.h": _header(d, d.excitation), f"{d.name}_commission.c": _source(d, d.excitation)}
 
 
 def _header(d: Deployment, e: Excitation) -> str:

@@ -117,10 +117,7 @@ def _refined_line(d: Deployment) -> list[str]:
 
 def example_files(deployment: Deployment) -> Files:
     """Name -> text."""
-    return {
-        f"{deployment.name}_example.h": _header(deployment),
-        f"{deployment.name}_example.c": _source(deployment),
-    }
+    return {f"{deployment.name}_example.h": _header(deployment), f"{deployment.name}_example.c": _source(deployment)}
 
 
 def _header(d: Deployment) -> str:

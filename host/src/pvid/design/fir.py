@@ -93,13 +93,7 @@ def finite_difference(stride: int = 1) -> FirBank:
     _require_stride(stride)
     _require_window(5, stride)
     weights = np.array(
-        [
-            [0.0, 0.0],
-            [8.0 / 12.0, -1.0 / 12.0],
-            [16.0 / 12.0, -1.0 / 12.0],
-            [-1.0, 1.0 / 2.0],
-            [-4.0, 1.0],
-        ]
+        [[0.0, 0.0], [8.0 / 12.0, -1.0 / 12.0], [16.0 / 12.0, -1.0 / 12.0], [-1.0, 1.0 / 2.0], [-4.0, 1.0]]
     )
     weights.setflags(write=False)
     return FirBank(weights, stride, "finite-difference", 4)

@@ -131,9 +131,7 @@ class ParquetWriter:
         kinds = {"f8": arrow.float64(), "i8": arrow.int64()}
         fields = [
             arrow.field(
-                name,
-                kinds.get(column.kind, arrow.string()),
-                metadata={"unit": column.unit, "description": column.what},
+                name, kinds.get(column.kind, arrow.string()), metadata={"unit": column.unit, "description": column.what}
             )
             for name, column in columns.items()
         ]
@@ -208,11 +206,7 @@ class McapWriter:
         """See Writer."""
         for log_time, message in messages(rows, self._tables):
             self._mcap.add_message(
-                self._channels[rows.table],
-                log_time,
-                encoded(message),
-                publish_time=log_time,
-                sequence=self._sequence,
+                self._channels[rows.table], log_time, encoded(message), publish_time=log_time, sequence=self._sequence
             )
             self._sequence = (self._sequence + 1) & 0xFFFFFFFF
 

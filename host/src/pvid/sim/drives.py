@@ -28,10 +28,7 @@ def _two_sines(amplitude: float, low_hz: float, high_hz: float, number: int) -> 
     apart = 1.0 + 0.17 * number
     middle = (low_hz * high_hz) ** 0.5
     return Sines(
-        (
-            (0.6 * amplitude, low_hz * apart, _GOLDEN * number),
-            (0.4 * amplitude, middle * apart, 1.0 + _GOLDEN * number),
-        )
+        ((0.6 * amplitude, low_hz * apart, _GOLDEN * number), (0.4 * amplitude, middle * apart, 1.0 + _GOLDEN * number))
     )
 
 
