@@ -12,4 +12,11 @@
 
 #include <cmocka.h>
 
+/* The program: runs the tests of an array. */
+#define RUN(tests)                                                                                                     \
+    int main(void)                                                                                                     \
+    {                                                                                                                  \
+        return cmocka_run_group_tests(tests, NULL, NULL);                                                              \
+    }
+
 #endif

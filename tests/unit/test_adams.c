@@ -68,11 +68,8 @@ static void test_a_step_of_a_polynomial_is_exact(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_weights_are_integrals_of_binomials),
-        cmocka_unit_test(test_a_step_of_a_polynomial_is_exact),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(test_weights_are_integrals_of_binomials),
+    cmocka_unit_test(test_a_step_of_a_polynomial_is_exact),
+};
+RUN(tests)

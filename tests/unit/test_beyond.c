@@ -8,32 +8,7 @@
 #include "pvid/pvid_q31.h"
 #include "pvid/snapshot_weak_q31.h"
 
-/* ---- where p is put ---- */
-
-static void a_place_is_a_number_within_the_bounds(void **state)
-{
-    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
-    config.model = &parameters;
-    config.update_rate_hz = 1.0f;
-    config.row_sd = 1.0f;
-    for (int i = 0; i < 4; i++) {
-        config.start[i] = 2.0f;
-        config.start_sd[i] = 1.0f;
-        config.lower[i] = 1.0f;
-        config.upper[i] = 4.0f;
-    }
-    pvid_estimator_f32 estimator;
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_OK);
-    const float there[4] = {0.5f, NAN, 5.0f, 3.0f};
-    pvid_estimator_place_f32(&estimator, there);
-    const float placed[4] = {1.0f, 2.0f, 4.0f, 3.0f};
-    assert_memory_equal(estimator.p, placed, sizeof placed);
-    assert_true(estimator.theta[2] == 4.0f); /* at the new p */
-}
-
 static pvid_weak_q31 identifier;
-
-/* ---- what is remembered ---- */
 
 static void a_weight_beyond_its_counter_is_its_end(void **state)
 {
@@ -69,12 +44,8 @@ static void a_snapshot_of_the_other_core_is_of_another_kind(void **state)
     assert_int_equal(pvid_snapshot_restore_weak_f32(&single, &config, image_of_single, m), PVID_SNAPSHOT_RESTORED);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_place_is_a_number_within_the_bounds),
-        cmocka_unit_test(a_snapshot_of_the_other_core_is_of_another_kind),
-        cmocka_unit_test(a_weight_beyond_its_counter_is_its_end),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(a_snapshot_of_the_other_core_is_of_another_kind),
+    cmocka_unit_test(a_weight_beyond_its_counter_is_its_end),
+};
+RUN(tests)

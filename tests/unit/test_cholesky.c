@@ -171,15 +171,12 @@ static void inverse_times_matrix_is_one(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(solving_returns_what_was_multiplied),
-        cmocka_unit_test(order_three_has_the_bits_of_the_general_order),
-        cmocka_unit_test(first_pivot_is_one_minus_r_squared),
-        cmocka_unit_test(indefinite_matrix_is_refused),
-        cmocka_unit_test(scaling_a_parameter_by_a_power_of_two_scales_its_solution_exactly),
-        cmocka_unit_test(inverse_times_matrix_is_one),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(solving_returns_what_was_multiplied),
+    cmocka_unit_test(order_three_has_the_bits_of_the_general_order),
+    cmocka_unit_test(first_pivot_is_one_minus_r_squared),
+    cmocka_unit_test(indefinite_matrix_is_refused),
+    cmocka_unit_test(scaling_a_parameter_by_a_power_of_two_scales_its_solution_exactly),
+    cmocka_unit_test(inverse_times_matrix_is_one),
+};
+RUN(tests)

@@ -129,14 +129,11 @@ static void a_scale_ends_at_the_widest(void **state)
     assert_int_equal(pvid_scale_q31(PVID_WIDE, 64), 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(solving_returns_what_was_multiplied),
-        cmocka_unit_test(indefinite_matrix_gives_zero_first_pivot),
-        cmocka_unit_test(only_eliminated_columns_are_read),
-        cmocka_unit_test(a_block_keeps_its_largest_entry_in_so_many_bits),
-        cmocka_unit_test(a_scale_ends_at_the_widest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(solving_returns_what_was_multiplied),
+    cmocka_unit_test(indefinite_matrix_gives_zero_first_pivot),
+    cmocka_unit_test(only_eliminated_columns_are_read),
+    cmocka_unit_test(a_block_keeps_its_largest_entry_in_so_many_bits),
+    cmocka_unit_test(a_scale_ends_at_the_widest),
+};
+RUN(tests)

@@ -337,20 +337,17 @@ static void every_bad_field_is_refused_by_name(void **state)
     pvid_commission_abort_f32(NULL);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(it_identifies_and_checks_on_a_second_burst),
-        cmocka_unit_test(a_short_ring_is_a_queue),
-        cmocka_unit_test(the_outcome_does_not_depend_on_when_work_is_called),
-        cmocka_unit_test(without_motion_it_is_not_excited),
-        cmocka_unit_test(within_too_tight_limits_it_blames_them),
-        cmocka_unit_test(soft_limits_hold_the_motion_and_hard_ones_abort),
-        cmocka_unit_test(another_mechanism_in_the_second_burst_does_not_fit),
-        cmocka_unit_test(it_is_aborted_in_every_state),
-        cmocka_unit_test(a_sensor_that_fails_aborts),
-        cmocka_unit_test(without_a_drive_it_identifies_what_moves_by_itself),
-        cmocka_unit_test(every_bad_field_is_refused_by_name),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(it_identifies_and_checks_on_a_second_burst),
+    cmocka_unit_test(a_short_ring_is_a_queue),
+    cmocka_unit_test(the_outcome_does_not_depend_on_when_work_is_called),
+    cmocka_unit_test(without_motion_it_is_not_excited),
+    cmocka_unit_test(within_too_tight_limits_it_blames_them),
+    cmocka_unit_test(soft_limits_hold_the_motion_and_hard_ones_abort),
+    cmocka_unit_test(another_mechanism_in_the_second_burst_does_not_fit),
+    cmocka_unit_test(it_is_aborted_in_every_state),
+    cmocka_unit_test(a_sensor_that_fails_aborts),
+    cmocka_unit_test(without_a_drive_it_identifies_what_moves_by_itself),
+    cmocka_unit_test(every_bad_field_is_refused_by_name),
+};
+RUN(tests)

@@ -118,13 +118,10 @@ static void test_a_parameter_at_its_bound_depends_last(void **state)
     assert_int_equal(ties.place[0], 1);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_step_with_its_return_is_newton_s),
-        cmocka_unit_test(test_the_projected_equations_give_the_constrained_least_squares),
-        cmocka_unit_test(test_redundant_constraints_are_left_out_and_contradictory_ones_never_met),
-        cmocka_unit_test(test_a_parameter_at_its_bound_depends_last),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(test_a_step_with_its_return_is_newton_s),
+    cmocka_unit_test(test_the_projected_equations_give_the_constrained_least_squares),
+    cmocka_unit_test(test_redundant_constraints_are_left_out_and_contradictory_ones_never_met),
+    cmocka_unit_test(test_a_parameter_at_its_bound_depends_last),
+};
+RUN(tests)

@@ -37,11 +37,8 @@ static void a_reading_beyond_the_modulus_is_its_remainder(void **state)
     assert_int_equal(pvid_counter_difference(5u, 0x80000005u, 0u), 0); /* half of 2^32 */
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_difference_is_the_motion_of_the_encoder),
-        cmocka_unit_test(a_reading_beyond_the_modulus_is_its_remainder),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(the_difference_is_the_motion_of_the_encoder),
+    cmocka_unit_test(a_reading_beyond_the_modulus_is_its_remainder),
+};
+RUN(tests)

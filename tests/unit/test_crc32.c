@@ -16,11 +16,8 @@ static void test_no_byte_changes_nothing(void **state)
     assert_int_equal(pvid_crc32(0xCBF43926u, NULL, 0), 0xCBF43926u);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_crc_is_that_of_zlib),
-        cmocka_unit_test(test_no_byte_changes_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(test_crc_is_that_of_zlib),
+    cmocka_unit_test(test_no_byte_changes_nothing),
+};
+RUN(tests)

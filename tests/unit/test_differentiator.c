@@ -131,14 +131,11 @@ static void the_longest_window_is_taken_and_no_longer_one(void **state)
     assert_int_equal(pvid_differentiator_init_f32(&self, &longer, 100.0f), PVID_BAD_HALF);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quartic_is_differentiated_exactly_at_the_centre),
-        cmocka_unit_test(constant_has_no_derivative_not_even_by_rounding),
-        cmocka_unit_test(reset_equals_a_fresh_start),
-        cmocka_unit_test(blocks_are_the_points_of_a_slower_window),
-        cmocka_unit_test(the_longest_window_is_taken_and_no_longer_one),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(quartic_is_differentiated_exactly_at_the_centre),
+    cmocka_unit_test(constant_has_no_derivative_not_even_by_rounding),
+    cmocka_unit_test(reset_equals_a_fresh_start),
+    cmocka_unit_test(blocks_are_the_points_of_a_slower_window),
+    cmocka_unit_test(the_longest_window_is_taken_and_no_longer_one),
+};
+RUN(tests)

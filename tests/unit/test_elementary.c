@@ -84,14 +84,11 @@ static void signs_are_plain_or_soft(void **state)
     assert_true(pvid_magnitude_f32(2.0f) == 2.0f);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(errors_are_those_of_the_header),
-        cmocka_unit_test(results_never_exceed_one),
-        cmocka_unit_test(beyond_the_limit_there_is_no_number),
-        cmocka_unit_test(tanh_is_that_of_the_library_within_its_error),
-        cmocka_unit_test(signs_are_plain_or_soft),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(errors_are_those_of_the_header),
+    cmocka_unit_test(results_never_exceed_one),
+    cmocka_unit_test(beyond_the_limit_there_is_no_number),
+    cmocka_unit_test(tanh_is_that_of_the_library_within_its_error),
+    cmocka_unit_test(signs_are_plain_or_soft),
+};
+RUN(tests)

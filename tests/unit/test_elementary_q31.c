@@ -120,16 +120,13 @@ static void the_hyperbolic_tangent_is_that_of_real_numbers(void **state)
     assert_int_equal(pvid_tanh_q31(INT32_MAX, 1), ONE);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(errors_are_those_of_the_header),
-        cmocka_unit_test(signs_are_plain_or_soft),
-        cmocka_unit_test(products_round_half_up_and_quotients_towards_0),
-        cmocka_unit_test(limits_are_inclusive),
-        cmocka_unit_test(scaled_functions_are_those_of_real_numbers),
-        cmocka_unit_test(quotients_have_the_sign_of_both),
-        cmocka_unit_test(the_hyperbolic_tangent_is_that_of_real_numbers),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(errors_are_those_of_the_header),
+    cmocka_unit_test(signs_are_plain_or_soft),
+    cmocka_unit_test(products_round_half_up_and_quotients_towards_0),
+    cmocka_unit_test(limits_are_inclusive),
+    cmocka_unit_test(scaled_functions_are_those_of_real_numbers),
+    cmocka_unit_test(quotients_have_the_sign_of_both),
+    cmocka_unit_test(the_hyperbolic_tangent_is_that_of_real_numbers),
+};
+RUN(tests)

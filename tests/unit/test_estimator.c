@@ -383,18 +383,21 @@ static void a_new_init_equals_a_fresh_object(void **state)
     assert_memory_equal(&used, &fresh, sizeof used);
 }
 
-static void a_place_is_within_the_bounds_and_moves_no_more_than_p(void **state)
+/* Both parameters and theta start at 1, between 0.5 and 3. */
+static pvid_estimator_config_f32 config_at_one(void)
 {
-    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
-    config.model = &own_model;
-    config.row_sd = 0.1f;
-    config.update_rate_hz = 100.0f;
+    pvid_estimator_config_f32 config = own_config();
     for (int a = 0; a < 2; a++) {
         config.start[a] = 1.0f;
-        config.start_sd[a] = 1.0f;
         config.lower[a] = 0.5f;
         config.upper[a] = 3.0f;
     }
+    return config;
+}
+
+static void a_place_is_within_the_bounds_and_moves_no_more_than_p(void **state)
+{
+    const pvid_estimator_config_f32 config = config_at_one();
     static pvid_estimator_f32 self;
     assert_int_equal(pvid_estimator_init_f32(&self, &config), PVID_OK);
     float p[PVID_MAX_P];
@@ -417,17 +420,8 @@ static void a_place_is_within_the_bounds_and_moves_no_more_than_p(void **state)
 
 static void rows_of_a_group_add_their_squares(void **state)
 {
-    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
-    config.model = &own_model;
-    config.row_sd = 0.1f;
-    config.update_rate_hz = 100.0f;
+    pvid_estimator_config_f32 config = config_at_one();
     config.row_weight = 0.5f;
-    for (int a = 0; a < 2; a++) {
-        config.start[a] = 1.0f;
-        config.start_sd[a] = 1.0f;
-        config.lower[a] = 0.5f;
-        config.upper[a] = 3.0f;
-    }
     static pvid_estimator_f32 self;
     assert_int_equal(pvid_estimator_init_f32(&self, &config), PVID_OK);
     const float n[3] = {1.0f, 2.0f, 4.0f}; /* theta is 1, 1, 1 */
@@ -448,43 +442,31 @@ static void a_start_s_deviation_has_its_range(void **state)
         pvid_status status;
     } cases[] = {{1.0e-12f, PVID_OK}, {0.9e-12f, PVID_BAD_START_SD}, {1.0e12f, PVID_OK}, {1.1e12f, PVID_BAD_START_SD}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
-        config.model = &own_model;
-        config.row_sd = 0.1f;
-        config.update_rate_hz = 100.0f;
-        for (int a = 0; a < 2; a++) {
-            config.start[a] = 1.0f;
-            config.start_sd[a] = 1.0f;
-            config.lower[a] = 0.5f;
-            config.upper[a] = 3.0f;
-        }
+        pvid_estimator_config_f32 config = config_at_one();
         config.start_sd[1] = cases[i].start_sd; /* of b, whose steps are relative to it */
         static pvid_estimator_f32 self;
         assert_int_equal(pvid_estimator_init_f32(&self, &config), cases[i].status);
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(own_model_is_identified),
-        cmocka_unit_test(standard_errors_of_own_model_match_the_noise),
-        cmocka_unit_test(no_standard_error_is_smaller_than_the_sensors_allow),
-        cmocka_unit_test(the_misfit_is_the_residual_variance_over_what_is_explained),
-        cmocka_unit_test(rounding_of_long_steps_widens_the_errors),
-        cmocka_unit_test(b_follows_the_estimate),
-        cmocka_unit_test(unusable_row_changes_nothing_but_its_counter),
-        cmocka_unit_test(divider_solves_every_third_row),
-        cmocka_unit_test(add_and_update_have_the_bits_of_step),
-        cmocka_unit_test(iterating_goes_on_to_the_least_squares_solution),
-        cmocka_unit_test(no_step_is_longer_than_its_limit_and_none_leaves_the_bounds),
-        cmocka_unit_test(without_excitation_the_start_is_held),
-        cmocka_unit_test(estimate_before_data_is_the_start),
-        cmocka_unit_test(counters_stop_at_their_end),
-        cmocka_unit_test(a_new_init_equals_a_fresh_object),
-        cmocka_unit_test(a_place_is_within_the_bounds_and_moves_no_more_than_p),
-        cmocka_unit_test(rows_of_a_group_add_their_squares),
-        cmocka_unit_test(a_start_s_deviation_has_its_range),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(own_model_is_identified),
+    cmocka_unit_test(standard_errors_of_own_model_match_the_noise),
+    cmocka_unit_test(no_standard_error_is_smaller_than_the_sensors_allow),
+    cmocka_unit_test(the_misfit_is_the_residual_variance_over_what_is_explained),
+    cmocka_unit_test(rounding_of_long_steps_widens_the_errors),
+    cmocka_unit_test(b_follows_the_estimate),
+    cmocka_unit_test(unusable_row_changes_nothing_but_its_counter),
+    cmocka_unit_test(divider_solves_every_third_row),
+    cmocka_unit_test(add_and_update_have_the_bits_of_step),
+    cmocka_unit_test(iterating_goes_on_to_the_least_squares_solution),
+    cmocka_unit_test(no_step_is_longer_than_its_limit_and_none_leaves_the_bounds),
+    cmocka_unit_test(without_excitation_the_start_is_held),
+    cmocka_unit_test(estimate_before_data_is_the_start),
+    cmocka_unit_test(counters_stop_at_their_end),
+    cmocka_unit_test(a_new_init_equals_a_fresh_object),
+    cmocka_unit_test(a_place_is_within_the_bounds_and_moves_no_more_than_p),
+    cmocka_unit_test(rows_of_a_group_add_their_squares),
+    cmocka_unit_test(a_start_s_deviation_has_its_range),
+};
+RUN(tests)

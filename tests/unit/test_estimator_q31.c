@@ -348,19 +348,16 @@ static void a_projection_is_exact_but_for_its_products(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(within_the_dead_zone_p_stays, start_again),
-        cmocka_unit_test_setup(a_wider_dead_zone_is_left_less_often, start_again),
-        cmocka_unit_test_setup(gauss_newton_steps_end_at_the_parameters_that_made_the_rows, start_again),
-        cmocka_unit_test_setup(a_row_beyond_its_format_changes_nothing_but_the_counter, start_again),
-        cmocka_unit_test_setup(a_solve_in_stages_is_the_solve_at_once, start_again),
-        cmocka_unit_test_setup(p_goes_to_the_fallback_if_it_may_not_step, start_again),
-        cmocka_unit_test_setup(without_rows_the_start_is_published, start_again),
-        cmocka_unit_test(information_of_noise_alone_moves_nothing),
-        cmocka_unit_test(p0_needs_more_information_than_its_start),
-        cmocka_unit_test(a_projection_is_exact_but_for_its_products),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup(within_the_dead_zone_p_stays, start_again),
+    cmocka_unit_test_setup(a_wider_dead_zone_is_left_less_often, start_again),
+    cmocka_unit_test_setup(gauss_newton_steps_end_at_the_parameters_that_made_the_rows, start_again),
+    cmocka_unit_test_setup(a_row_beyond_its_format_changes_nothing_but_the_counter, start_again),
+    cmocka_unit_test_setup(a_solve_in_stages_is_the_solve_at_once, start_again),
+    cmocka_unit_test_setup(p_goes_to_the_fallback_if_it_may_not_step, start_again),
+    cmocka_unit_test_setup(without_rows_the_start_is_published, start_again),
+    cmocka_unit_test(information_of_noise_alone_moves_nothing),
+    cmocka_unit_test(p0_needs_more_information_than_its_start),
+    cmocka_unit_test(a_projection_is_exact_but_for_its_products),
+};
+RUN(tests)

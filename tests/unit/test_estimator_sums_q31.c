@@ -409,19 +409,16 @@ static void counters_stop_at_their_end(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(result_is_invariant_to_row_scale),
-        cmocka_unit_test_setup(the_start_weighs_the_same_beside_sums_of_any_size, start_again),
-        cmocka_unit_test_setup(the_expected_noise_is_in_the_unit_of_the_sums, start_again),
-        cmocka_unit_test_setup(the_residuals_are_weighed_against_what_the_sensors_explain, start_again),
-        cmocka_unit_test_setup(expected_variance_is_a_mean_over_remaining_rows, start_again),
-        cmocka_unit_test_setup(a_row_at_its_limit_fits, start_again),
-        cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),
-        cmocka_unit_test_setup(steps_are_limited_and_bounded, start_again),
-        cmocka_unit_test_setup(the_others_are_solved_beside_bounds_that_act, start_again),
-        cmocka_unit_test(counters_stop_at_their_end),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(result_is_invariant_to_row_scale),
+    cmocka_unit_test_setup(the_start_weighs_the_same_beside_sums_of_any_size, start_again),
+    cmocka_unit_test_setup(the_expected_noise_is_in_the_unit_of_the_sums, start_again),
+    cmocka_unit_test_setup(the_residuals_are_weighed_against_what_the_sensors_explain, start_again),
+    cmocka_unit_test_setup(expected_variance_is_a_mean_over_remaining_rows, start_again),
+    cmocka_unit_test_setup(a_row_at_its_limit_fits, start_again),
+    cmocka_unit_test_setup(a_place_is_held_within_the_bounds, start_again),
+    cmocka_unit_test_setup(steps_are_limited_and_bounded, start_again),
+    cmocka_unit_test_setup(the_others_are_solved_beside_bounds_that_act, start_again),
+    cmocka_unit_test(counters_stop_at_their_end),
+};
+RUN(tests)

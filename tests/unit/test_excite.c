@@ -474,21 +474,18 @@ static void a_table_by_rule_keeps_its_amplitude(void **state)
     assert_int_equal(pvid_excite_rule_f32(part, 1.0f, 2.0f, 1.0f), 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_tone_is_the_sine_of_the_table),
-        cmocka_unit_test(a_chirp_turns_at_its_ends),
-        cmocka_unit_test(a_prbs_has_two_levels_and_the_longest_period),
-        cmocka_unit_test(steps_follow_their_levels),
-        cmocka_unit_test(another_run_is_another_motion),
-        cmocka_unit_test(it_starts_softly_and_ends_at_zero),
-        cmocka_unit_test(a_stop_is_soft_and_an_abort_falls_at_the_slew_rate),
-        cmocka_unit_test(a_sensor_that_is_no_number_or_missing_aborts),
-        cmocka_unit_test(no_draw_leaves_the_limits_of_the_drive),
-        cmocka_unit_test(no_draw_leaves_the_limits_of_the_mechanism),
-        cmocka_unit_test(every_bad_field_is_refused_by_name),
-        cmocka_unit_test(a_table_by_rule_keeps_its_amplitude),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(a_tone_is_the_sine_of_the_table),
+    cmocka_unit_test(a_chirp_turns_at_its_ends),
+    cmocka_unit_test(a_prbs_has_two_levels_and_the_longest_period),
+    cmocka_unit_test(steps_follow_their_levels),
+    cmocka_unit_test(another_run_is_another_motion),
+    cmocka_unit_test(it_starts_softly_and_ends_at_zero),
+    cmocka_unit_test(a_stop_is_soft_and_an_abort_falls_at_the_slew_rate),
+    cmocka_unit_test(a_sensor_that_is_no_number_or_missing_aborts),
+    cmocka_unit_test(no_draw_leaves_the_limits_of_the_drive),
+    cmocka_unit_test(no_draw_leaves_the_limits_of_the_mechanism),
+    cmocka_unit_test(every_bad_field_is_refused_by_name),
+    cmocka_unit_test(a_table_by_rule_keeps_its_amplitude),
+};
+RUN(tests)

@@ -74,12 +74,9 @@ static void test_the_hash_of_an_estimator_is_that_of_its_words(void **state)
     assert_int_equal(pvid_fnv_estimator_q31(17u, &fixed, PVID_UPDATED), of_fixed);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_empty_input_is_the_offset_basis),
-        cmocka_unit_test(test_published_vectors),
-        cmocka_unit_test(test_the_hash_of_an_estimator_is_that_of_its_words),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(test_empty_input_is_the_offset_basis),
+    cmocka_unit_test(test_published_vectors),
+    cmocka_unit_test(test_the_hash_of_an_estimator_is_that_of_its_words),
+};
+RUN(tests)

@@ -119,13 +119,10 @@ static void reading_changes_nothing_and_adding_reports_what_reading_does(void **
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ten_million_equal_rows_neither_stall_nor_drift),
-        cmocka_unit_test(small_terms_after_large_ones_are_kept),
-        cmocka_unit_test(weight_settles_at_the_time_constant),
-        cmocka_unit_test(reading_changes_nothing_and_adding_reports_what_reading_does),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(ten_million_equal_rows_neither_stall_nor_drift),
+    cmocka_unit_test(small_terms_after_large_ones_are_kept),
+    cmocka_unit_test(weight_settles_at_the_time_constant),
+    cmocka_unit_test(reading_changes_nothing_and_adding_reports_what_reading_does),
+};
+RUN(tests)

@@ -172,14 +172,11 @@ static void residuals_of_many_rows_stop_at_their_limit(void **state)
     assert_int_equal(information.sums[9], largest / 4);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(residuals_of_many_rows_stop_at_their_limit),
-        cmocka_unit_test(sums_are_exact),
-        cmocka_unit_test(the_past_fades_by_exp),
-        cmocka_unit_test(sums_keep_below_their_limit),
-        cmocka_unit_test(any_sum_of_squares_may_be_the_largest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(residuals_of_many_rows_stop_at_their_limit),
+    cmocka_unit_test(sums_are_exact),
+    cmocka_unit_test(the_past_fades_by_exp),
+    cmocka_unit_test(sums_keep_below_their_limit),
+    cmocka_unit_test(any_sum_of_squares_may_be_the_largest),
+};
+RUN(tests)

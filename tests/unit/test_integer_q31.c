@@ -220,21 +220,18 @@ static void half_an_exponent_brings_a_diagonal_near_one(void **unused)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_shift_right_rounds_half_up),
-        cmocka_unit_test(a_shift_left_saturates),
-        cmocka_unit_test(a_product_in_halves_is_the_product),
-        cmocka_unit_test(a_quotient_in_halves_is_the_quotient),
-        cmocka_unit_test(a_byte_has_its_length),
-        cmocka_unit_test(an_upper_product_is_the_floor_of_the_product),
-        cmocka_unit_test(bits_are_counted),
-        cmocka_unit_test(a_root_is_the_largest_whose_square_fits),
-        cmocka_unit_test(a_scaled_root_keeps_thirty_bits),
-        cmocka_unit_test(a_product_with_a_fraction_is_exact_before_it_is_rounded),
-        cmocka_unit_test(first_pivot_is_its_remaining_part),
-        cmocka_unit_test(half_an_exponent_brings_a_diagonal_near_one),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(a_shift_right_rounds_half_up),
+    cmocka_unit_test(a_shift_left_saturates),
+    cmocka_unit_test(a_product_in_halves_is_the_product),
+    cmocka_unit_test(a_quotient_in_halves_is_the_quotient),
+    cmocka_unit_test(a_byte_has_its_length),
+    cmocka_unit_test(an_upper_product_is_the_floor_of_the_product),
+    cmocka_unit_test(bits_are_counted),
+    cmocka_unit_test(a_root_is_the_largest_whose_square_fits),
+    cmocka_unit_test(a_scaled_root_keeps_thirty_bits),
+    cmocka_unit_test(a_product_with_a_fraction_is_exact_before_it_is_rounded),
+    cmocka_unit_test(first_pivot_is_its_remaining_part),
+    cmocka_unit_test(half_an_exponent_brings_a_diagonal_near_one),
+};
+RUN(tests)

@@ -497,21 +497,18 @@ static void diagonals_are_where_the_packed_rows_begin(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(blocks_lie_behind_each_other),
-        cmocka_unit_test(the_first_kind_begins_at_the_first_theta),
-        cmocka_unit_test(rows_go_to_the_block_of_their_kind),
-        cmocka_unit_test(products_with_blocks_equal_dense_products),
-        cmocka_unit_test(kinds_divide_theta_or_are_refused),
-        cmocka_unit_test(several_kinds_find_their_parameters),
-        cmocka_unit_test(a_vector_is_added_to_b_or_refused),
-        cmocka_unit_test(fixed_point_finds_the_parameters_of_several_kinds),
-        cmocka_unit_test(a_fixed_point_vector_is_added_to_b_or_refused),
-        cmocka_unit_test(a_fixed_point_model_is_whole_or_refused),
-        cmocka_unit_test(formats_of_theta_follow_the_start),
-        cmocka_unit_test(diagonals_are_where_the_packed_rows_begin),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(blocks_lie_behind_each_other),
+    cmocka_unit_test(the_first_kind_begins_at_the_first_theta),
+    cmocka_unit_test(rows_go_to_the_block_of_their_kind),
+    cmocka_unit_test(products_with_blocks_equal_dense_products),
+    cmocka_unit_test(kinds_divide_theta_or_are_refused),
+    cmocka_unit_test(several_kinds_find_their_parameters),
+    cmocka_unit_test(a_vector_is_added_to_b_or_refused),
+    cmocka_unit_test(fixed_point_finds_the_parameters_of_several_kinds),
+    cmocka_unit_test(a_fixed_point_vector_is_added_to_b_or_refused),
+    cmocka_unit_test(a_fixed_point_model_is_whole_or_refused),
+    cmocka_unit_test(formats_of_theta_follow_the_start),
+    cmocka_unit_test(diagonals_are_where_the_packed_rows_begin),
+};
+RUN(tests)

@@ -52,13 +52,10 @@ static void nan_rows_are_a_misfit_and_keep_the_reference(void **state)
     assert_true(block(0.02, 1.0));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_block_is_four_seconds_of_rows, start_again),
-        cmocka_unit_test_setup(reference_fades_with_the_sums, start_again),
-        cmocka_unit_test_setup(nan_rows_are_a_misfit_and_keep_the_reference, start_again),
-        MISFIT_CASES,
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup(a_block_is_four_seconds_of_rows, start_again),
+    cmocka_unit_test_setup(reference_fades_with_the_sums, start_again),
+    cmocka_unit_test_setup(nan_rows_are_a_misfit_and_keep_the_reference, start_again),
+    MISFIT_CASES,
+};
+RUN(tests)

@@ -104,15 +104,12 @@ static void the_largest_rows_do_not_overflow(void **state)
     assert_false(pvid_misfit_judge_q31(&misfit));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_block_is_four_seconds_of_rows, start_again),
-        cmocka_unit_test_setup(the_squares_of_a_block_add_up, start_again),
-        cmocka_unit_test_setup(reference_fades_with_the_sums, start_again),
-        cmocka_unit_test_setup(growing_scale_stays_in_range, start_again),
-        cmocka_unit_test_setup(the_largest_rows_do_not_overflow, start_again),
-        MISFIT_CASES,
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup(a_block_is_four_seconds_of_rows, start_again),
+    cmocka_unit_test_setup(the_squares_of_a_block_add_up, start_again),
+    cmocka_unit_test_setup(reference_fades_with_the_sums, start_again),
+    cmocka_unit_test_setup(growing_scale_stays_in_range, start_again),
+    cmocka_unit_test_setup(the_largest_rows_do_not_overflow, start_again),
+    MISFIT_CASES,
+};
+RUN(tests)

@@ -191,11 +191,8 @@ static void a_fixed_point_model_fits_or_is_refused(void **state)
     ACCEPTED_Q31((fixed_config.n_bits[5] = 127, fixed_config.p_bits[3] = 127)); /* of no entry, of no parameter */
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_float_model_fits_or_is_refused),
-        cmocka_unit_test(a_fixed_point_model_fits_or_is_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(a_float_model_fits_or_is_refused),
+    cmocka_unit_test(a_fixed_point_model_fits_or_is_refused),
+};
+RUN(tests)

@@ -99,14 +99,11 @@ static void null_is_refused(void **state)
     assert_false(pvid_weak_read_q31(&weak_q31, &read_q31, NULL));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(nothing_is_published_at_first, start_again),
-        cmocka_unit_test_setup(latest_publication_is_read_with_its_number, start_again),
-        cmocka_unit_test_setup(the_copy_is_read_while_the_estimate_is_written, start_again),
-        cmocka_unit_test_setup(versions_come_round_and_numbers_stop, start_again),
-        cmocka_unit_test_setup(null_is_refused, start_again),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup(nothing_is_published_at_first, start_again),
+    cmocka_unit_test_setup(latest_publication_is_read_with_its_number, start_again),
+    cmocka_unit_test_setup(the_copy_is_read_while_the_estimate_is_written, start_again),
+    cmocka_unit_test_setup(versions_come_round_and_numbers_stop, start_again),
+    cmocka_unit_test_setup(null_is_refused, start_again),
+};
+RUN(tests)

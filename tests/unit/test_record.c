@@ -315,17 +315,14 @@ static void a_record_is_the_start_in_fixed_point(void **state)
     assert_memory_equal(&unchanged, &next_fixed, sizeof unchanged);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(the_layout_is_that_of_the_header, live),
-        cmocka_unit_test_setup(a_publication_between_two_pieces_begins_again, live),
-        cmocka_unit_test_setup(only_what_is_published_and_valid_is_saved, live),
-        cmocka_unit_test_setup(the_values_are_the_start_of_the_next_life, live),
-        cmocka_unit_test_setup(every_truncation_and_every_flip_is_refused, live),
-        cmocka_unit_test_setup(whole_records_of_others_name_their_reason, live),
-        cmocka_unit_test(integers_of_any_format_are_written_as_the_nearest_binary32),
-        cmocka_unit_test(a_record_is_the_start_in_fixed_point),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup(the_layout_is_that_of_the_header, live),
+    cmocka_unit_test_setup(a_publication_between_two_pieces_begins_again, live),
+    cmocka_unit_test_setup(only_what_is_published_and_valid_is_saved, live),
+    cmocka_unit_test_setup(the_values_are_the_start_of_the_next_life, live),
+    cmocka_unit_test_setup(every_truncation_and_every_flip_is_refused, live),
+    cmocka_unit_test_setup(whole_records_of_others_name_their_reason, live),
+    cmocka_unit_test(integers_of_any_format_are_written_as_the_nearest_binary32),
+    cmocka_unit_test(a_record_is_the_start_in_fixed_point),
+};
+RUN(tests)

@@ -117,12 +117,9 @@ static void a_packed_number_keeps_twenty_bits(void **state)
     assert_int_equal(pvid_scaled_unpacked_q31(0).m, 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_integer_keeps_thirty_digits),       cmocka_unit_test(a_shift_and_a_fixed_point_are_exact),
-        cmocka_unit_test(operations_are_those_of_real_numbers), cmocka_unit_test(empty_input_changes_nothing),
-        cmocka_unit_test(a_packed_number_keeps_twenty_bits),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(an_integer_keeps_thirty_digits),       cmocka_unit_test(a_shift_and_a_fixed_point_are_exact),
+    cmocka_unit_test(operations_are_those_of_real_numbers), cmocka_unit_test(empty_input_changes_nothing),
+    cmocka_unit_test(a_packed_number_keeps_twenty_bits),
+};
+RUN(tests)

@@ -274,20 +274,17 @@ static void every_entry_of_a_list_counts_in_a_fingerprint(void **state)
     assert_int_equal(pvid_fingerprint_floats(7u, values, 0), 7u);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_restored_run_continues_bit_for_bit_from_every_tick),
-        cmocka_unit_test(a_pointer_into_the_object_points_into_the_restored_one),
-        cmocka_unit_test(every_damaged_byte_is_seen_and_nothing_is_changed),
-        cmocka_unit_test(every_length_that_is_too_short_is_refused),
-        cmocka_unit_test(snapshot_of_another_object_names_its_kind),
-        cmocka_unit_test(a_table_that_changed_is_another_design),
-        cmocka_unit_test(the_format_of_rows_counts),
-        cmocka_unit_test(slots_are_used_in_turn),
-        cmocka_unit_test(generations_go_round),
-        cmocka_unit_test(a_power_cut_at_any_byte_leaves_the_older_snapshot),
-        cmocka_unit_test(every_entry_of_a_list_counts_in_a_fingerprint),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(a_restored_run_continues_bit_for_bit_from_every_tick),
+    cmocka_unit_test(a_pointer_into_the_object_points_into_the_restored_one),
+    cmocka_unit_test(every_damaged_byte_is_seen_and_nothing_is_changed),
+    cmocka_unit_test(every_length_that_is_too_short_is_refused),
+    cmocka_unit_test(snapshot_of_another_object_names_its_kind),
+    cmocka_unit_test(a_table_that_changed_is_another_design),
+    cmocka_unit_test(the_format_of_rows_counts),
+    cmocka_unit_test(slots_are_used_in_turn),
+    cmocka_unit_test(generations_go_round),
+    cmocka_unit_test(a_power_cut_at_any_byte_leaves_the_older_snapshot),
+    cmocka_unit_test(every_entry_of_a_list_counts_in_a_fingerprint),
+};
+RUN(tests)

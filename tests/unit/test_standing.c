@@ -229,21 +229,18 @@ static void starts_are_spread_by_a_factor_of_four(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(an_estimate_is_valid_behind_eight_windows_that_fit, start_again),
-        cmocka_unit_test_setup(eight_valid_publications_in_a_row_are_trusted, start_again),
-        cmocka_unit_test_setup(what_contradicts_twice_withdraws, start_again),
-        cmocka_unit_test_setup(larger_errors_are_a_doubt_until_the_next_publication, start_again),
-        cmocka_unit_test_setup(residuals_above_the_noise_are_a_misfit_and_one_window_is_none, start_again),
-        cmocka_unit_test_setup(windows_before_p_arrives_are_no_misfit, start_again),
-        cmocka_unit_test_setup(without_a_limit_of_misfit_there_is_none, start_again),
-        cmocka_unit_test_setup(six_rejected_windows_of_sixteen_are_a_doubt, start_again),
-        cmocka_unit_test_setup(an_opening_withdraws_and_starts_at_the_trusted_p, start_again),
-        cmocka_unit_test_setup(six_starts_in_turn_then_a_pause, start_again),
-        cmocka_unit_test_setup(a_misfit_before_the_first_publication_starts_nothing, start_again),
-        cmocka_unit_test_setup(starts_are_spread_by_a_factor_of_four, start_again),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup(an_estimate_is_valid_behind_eight_windows_that_fit, start_again),
+    cmocka_unit_test_setup(eight_valid_publications_in_a_row_are_trusted, start_again),
+    cmocka_unit_test_setup(what_contradicts_twice_withdraws, start_again),
+    cmocka_unit_test_setup(larger_errors_are_a_doubt_until_the_next_publication, start_again),
+    cmocka_unit_test_setup(residuals_above_the_noise_are_a_misfit_and_one_window_is_none, start_again),
+    cmocka_unit_test_setup(windows_before_p_arrives_are_no_misfit, start_again),
+    cmocka_unit_test_setup(without_a_limit_of_misfit_there_is_none, start_again),
+    cmocka_unit_test_setup(six_rejected_windows_of_sixteen_are_a_doubt, start_again),
+    cmocka_unit_test_setup(an_opening_withdraws_and_starts_at_the_trusted_p, start_again),
+    cmocka_unit_test_setup(six_starts_in_turn_then_a_pause, start_again),
+    cmocka_unit_test_setup(a_misfit_before_the_first_publication_starts_nothing, start_again),
+    cmocka_unit_test_setup(starts_are_spread_by_a_factor_of_four, start_again),
+};
+RUN(tests)

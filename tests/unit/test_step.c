@@ -343,26 +343,23 @@ static void information_is_compared_with_that_of_noise(void **state)
     assert_false(pvid_assess_above_noise_f32(&system, &settings, 0.5f, (const float (*)[PVID_MAX_P])none));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_step_solves_the_equations),
-        cmocka_unit_test(the_right_hand_side_may_differ_from_the_force),
-        cmocka_unit_test(a_step_in_place_is_the_same),
-        cmocka_unit_test(a_large_step_is_shortened_as_a_whole),
-        cmocka_unit_test(a_parameter_that_is_pulled_out_of_its_bound_is_pinned),
-        cmocka_unit_test(a_step_that_leaves_a_bound_waits_for_the_next_solve),
-        cmocka_unit_test(a_step_stops_at_the_bounds),
-        cmocka_unit_test(a_singular_system_holds_p),
-        cmocka_unit_test(a_number_that_is_none_holds_p),
-        cmocka_unit_test(too_little_excitation_holds_p),
-        cmocka_unit_test(no_step_is_taken_in_the_dead_zone),
-        cmocka_unit_test(the_covariance_is_the_inverse_of_the_information),
-        cmocka_unit_test(without_information_the_errors_are_those_of_the_start),
-        cmocka_unit_test(a_covariance_that_is_none_is_not_published),
-        cmocka_unit_test(the_variance_has_its_limits),
-        cmocka_unit_test(the_misfit_compares_the_residual_with_its_floor),
-        cmocka_unit_test(information_is_compared_with_that_of_noise),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(a_step_solves_the_equations),
+    cmocka_unit_test(the_right_hand_side_may_differ_from_the_force),
+    cmocka_unit_test(a_step_in_place_is_the_same),
+    cmocka_unit_test(a_large_step_is_shortened_as_a_whole),
+    cmocka_unit_test(a_parameter_that_is_pulled_out_of_its_bound_is_pinned),
+    cmocka_unit_test(a_step_that_leaves_a_bound_waits_for_the_next_solve),
+    cmocka_unit_test(a_step_stops_at_the_bounds),
+    cmocka_unit_test(a_singular_system_holds_p),
+    cmocka_unit_test(a_number_that_is_none_holds_p),
+    cmocka_unit_test(too_little_excitation_holds_p),
+    cmocka_unit_test(no_step_is_taken_in_the_dead_zone),
+    cmocka_unit_test(the_covariance_is_the_inverse_of_the_information),
+    cmocka_unit_test(without_information_the_errors_are_those_of_the_start),
+    cmocka_unit_test(a_covariance_that_is_none_is_not_published),
+    cmocka_unit_test(the_variance_has_its_limits),
+    cmocka_unit_test(the_misfit_compares_the_residual_with_its_floor),
+    cmocka_unit_test(information_is_compared_with_that_of_noise),
+};
+RUN(tests)

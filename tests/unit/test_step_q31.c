@@ -204,18 +204,15 @@ static void without_a_factor_the_errors_are_those_of_the_start(void **state)
     assert_true((estimate.correlation[0][1] == 0) && (estimate.correlation[1][1] == PVID_ONE_Q30));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_step_is_added),
-        cmocka_unit_test(a_large_step_is_shortened_as_a_whole),
-        cmocka_unit_test(a_step_of_any_size_stops_at_the_bounds),
-        cmocka_unit_test(excitation_is_kappa_and_more_than_the_prior),
-        cmocka_unit_test(a_singular_system_has_no_factor),
-        cmocka_unit_test(the_dead_zone_is_measured_in_standard_errors),
-        cmocka_unit_test(the_residual_gives_the_variance),
-        cmocka_unit_test(the_covariance_is_the_inverse_of_the_information),
-        cmocka_unit_test(without_a_factor_the_errors_are_those_of_the_start),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(a_step_is_added),
+    cmocka_unit_test(a_large_step_is_shortened_as_a_whole),
+    cmocka_unit_test(a_step_of_any_size_stops_at_the_bounds),
+    cmocka_unit_test(excitation_is_kappa_and_more_than_the_prior),
+    cmocka_unit_test(a_singular_system_has_no_factor),
+    cmocka_unit_test(the_dead_zone_is_measured_in_standard_errors),
+    cmocka_unit_test(the_residual_gives_the_variance),
+    cmocka_unit_test(the_covariance_is_the_inverse_of_the_information),
+    cmocka_unit_test(without_a_factor_the_errors_are_those_of_the_start),
+};
+RUN(tests)

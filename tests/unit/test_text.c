@@ -47,14 +47,11 @@ static void test_the_names_of_version_0_1_mean_the_same(void **state)
                         "bad range: range of a signal: not finite or not positive");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_reason_is_its_name_in_words),
-        cmocka_unit_test(test_a_status_tells_what_the_field_must_be),
-        cmocka_unit_test(test_a_number_that_is_none_has_a_text_too),
-        cmocka_unit_test(test_every_status_has_a_text_of_its_own),
-        cmocka_unit_test(test_the_names_of_version_0_1_mean_the_same),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(test_a_reason_is_its_name_in_words),
+    cmocka_unit_test(test_a_status_tells_what_the_field_must_be),
+    cmocka_unit_test(test_a_number_that_is_none_has_a_text_too),
+    cmocka_unit_test(test_every_status_has_a_text_of_its_own),
+    cmocka_unit_test(test_the_names_of_version_0_1_mean_the_same),
+};
+RUN(tests)

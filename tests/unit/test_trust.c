@@ -162,11 +162,8 @@ static void sums_without_digits_fade(void **state)
     assert_int_equal(groups_of_fading(&left), 4);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TRUST_CASES cmocka_unit_test_setup(nan_counts_as_the_worst, start_again),
-        cmocka_unit_test_setup(sums_without_digits_fade, start_again),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    TRUST_CASES cmocka_unit_test_setup(nan_counts_as_the_worst, start_again),
+    cmocka_unit_test_setup(sums_without_digits_fade, start_again),
+};
+RUN(tests)

@@ -141,10 +141,7 @@ static void huge_variance_ratio_is_clamped(void **state)
     assert_int_equal(trust.long_mean, q24(1.0e6));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TRUST_CASES cmocka_unit_test_setup(huge_variance_ratio_is_clamped, start_again),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    TRUST_CASES cmocka_unit_test_setup(huge_variance_ratio_is_clamped, start_again),
+};
+RUN(tests)

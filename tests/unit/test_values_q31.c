@@ -203,14 +203,11 @@ static void test_a_run_begins_before_the_first_step(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_sign_is_its_mean_over_a_step),
-        cmocka_unit_test(test_a_run_is_the_sum_of_its_derivative_by_trapezoids),
-        cmocka_unit_test(test_integrals_of_a_cubic_are_those_of_the_rule),
-        cmocka_unit_test(test_a_constant_at_the_end_is_not_summed),
-        cmocka_unit_test(test_a_run_begins_before_the_first_step),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(test_a_sign_is_its_mean_over_a_step),
+    cmocka_unit_test(test_a_run_is_the_sum_of_its_derivative_by_trapezoids),
+    cmocka_unit_test(test_integrals_of_a_cubic_are_those_of_the_rule),
+    cmocka_unit_test(test_a_constant_at_the_end_is_not_summed),
+    cmocka_unit_test(test_a_run_begins_before_the_first_step),
+};
+RUN(tests)

@@ -16,21 +16,27 @@
 #include "solve/state_f32.h"
 
 static pvid_weak_f32 self;
+static pvid_weak_design_f32 design;
+static pvid_weak_config_f32 config;
 
-static void start(pvid_weak_design_f32 *design, pvid_weak_config_f32 *config)
+static void init(void)
 {
-    *design = design_of(&mechanism);
-    *config = config_of(design);
-    assert_int_equal(pvid_weak_init_f32(&self, config), PVID_OK);
+    assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+}
+
+/* An identifier of the mechanism, whose design and settings a test may change before it calls init again. */
+static void start(void)
+{
+    design = design_of(&mechanism);
+    config = config_of(&design);
+    init();
 }
 
 /* ---- estimates ---- */
 
 static void parameters_are_found_within_their_errors(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
-    start(&design, &config);
+    start();
     first_order rig = {.generator = 1u};
     uint32_t updates = 0;
     for (int tick = 0; tick < 12000; tick++) {
@@ -61,9 +67,7 @@ static void scatter_of_the_windows_widens_the_standard_errors(void **state)
 {
     float se[2][4];
     for (int disturbed = 0; disturbed < 2; disturbed++) {
-        pvid_weak_design_f32 design;
-        pvid_weak_config_f32 config;
-        start(&design, &config);
+        start();
         first_order rig = {.generator = 5u};
         for (int tick = 0; tick < 6000; tick++) {
             float sample[2];
@@ -95,9 +99,7 @@ static void sum_of(const double channel[2 * HOP], int h, double out[2])
 /* Integrals of x from the window's start by a rule of its own: fine trapezoids of the cubic through the steps. */
 static void sums_are_those_of_the_definition(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
-    start(&design, &config);
+    start();
     /* the integrand is the second sample: here a sine, whose integrals are known */
     const double w = 11.0;
     int tick = 0;
@@ -194,9 +196,7 @@ static double row_entry(int column, size_t row)
 
 static void rows_have_the_moments_of_generalised_least_squares(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
-    start(&design, &config);
+    start();
     config.gate.sigmas = 0.0f;
     first_order rig = {.generator = 9u};
     static float given[4 * HOP][2];
@@ -306,7 +306,7 @@ static void jets_are_those_of_the_filters_for_every_decimation(void **state)
     model.signal = derived;
     model.jets = 4;
     model.jet = derived_jets;
-    pvid_weak_design_f32 design = design_of(&model);
+    design = design_of(&model);
     design.compensator = derived_filters;
     static const uint8_t decimations[6] = {1, 2, 3, 7, 8, 20};
     for (size_t i = 0; i < 6u; i++) {
@@ -354,12 +354,10 @@ static void jets_are_those_of_the_filters_for_every_decimation(void **state)
 /* A window needs no more stages than init has counted, and hardly less, and ends before the next one begins. */
 static void stages_are_as_many_as_counted(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     for (int compensation = 0; compensation < 2; compensation++) {
-        start(&design, &config);
+        start();
         config.compensation = compensation != 0;
-        assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+        init();
         first_order rig = {.generator = 3u};
         while (self.finish.stage == PVID_WEAK_IDLE) {
             float sample[2];
@@ -380,40 +378,35 @@ static void stages_are_as_many_as_counted(void **state)
 
 static void assessment_takes_the_stated_number_of_stages(void **state)
 {
-    static pvid_weak_f32 weak;
-    const pvid_weak_design_f32 design = design_of(&mechanism);
-    const pvid_weak_config_f32 settings = config_of(&design);
-    assert_int_equal(pvid_weak_init_f32(&weak, &settings), PVID_OK);
+    start();
     first_order rig = {.generator = 1u};
     for (int i = 0; i < 10 * HOP; i++) {
         float sample[2];
         next_sample(&rig, sample);
-        (void)pvid_weak_step_f32(&weak, sample);
+        (void)pvid_weak_step_f32(&self, sample);
     }
     static pvid_estimator_solve_f32 solve;
     pvid_estimate_f32 estimate;
-    pvid_estimator_begin_assessment_f32(&weak.estimator, &solve, &estimate);
+    pvid_estimator_begin_assessment_f32(&self.estimator, &solve, &estimate);
     uint32_t stages = 1;
-    while (!pvid_estimator_assess_advance_f32(&weak.estimator, &solve)) {
+    while (!pvid_estimator_assess_advance_f32(&self.estimator, &solve)) {
         stages++;
     }
-    assert_int_equal(stages, pvid_estimator_assessment_stages_f32(&weak.estimator));
-    assert_true(pvid_estimator_assess_advance_f32(&weak.estimator, &solve)); /* nothing is left to do */
+    assert_int_equal(stages, pvid_estimator_assessment_stages_f32(&self.estimator));
+    assert_true(pvid_estimator_assess_advance_f32(&self.estimator, &solve)); /* nothing is left to do */
 }
 
 static void a_window_that_cannot_be_processed_in_time_is_refused(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
-    start(&design, &config);
+    start();
     static pvid_weak_noise_f32 many[2100]; /* eight a stage, twice */
     for (size_t i = 0; i < 2100u; i++) {
         many[i] = noise[i % 2u];
     }
     design.noise = many;
     design.n_noise = 2100;
-    design.hop =
-        16; /* one block of eight ticks in which the window's work would have to be done, less those for sums */
+    /* one block of eight ticks in which the window's work would have to be done, less those for sums */
+    design.hop = 16;
     config.iterations = PVID_MAX_ITERATIONS;
     assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_BAD_ITERATIONS);
 }
@@ -426,11 +419,10 @@ static void estimates_do_not_depend_on_the_slices_of_the_schedule(void **state)
     float p[2][4];
     for (int slow = 0; slow < 2; slow++) {
         const int d = (slow != 0) ? 8 : 1;
-        pvid_weak_design_f32 design = design_of(&mechanism);
+        start();
         design.decimation = (uint8_t)d;
-        pvid_weak_config_f32 config = config_of(&design);
         config.sample_rate_hz = (float)(d * RATE);
-        assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+        init();
         first_order rig = {.generator = 7u};
         for (int step = -slow; step < 1500; step++) {
             float sample[2] = {0.0f, 0.0f};
@@ -469,10 +461,8 @@ static uint32_t run(first_order *rig, int ticks, uint32_t reasons[16])
 
 static void a_gap_restarts_the_windows_and_keeps_the_sums(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     uint32_t reasons[16];
-    start(&design, &config);
+    start();
     first_order rig = {.generator = 2u};
     assert_true(run(&rig, 30 * HOP, reasons) > 20u);
     const float run_before = self.history.run[0];
@@ -488,10 +478,8 @@ static void a_gap_restarts_the_windows_and_keeps_the_sums(void **state)
 
 static void a_sample_that_is_not_finite_is_rejected_and_restarts(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     uint32_t reasons[16];
-    start(&design, &config);
+    start();
     first_order rig = {.generator = 4u};
     (void)run(&rig, 20 * HOP, reasons);
     const float bad[3] = {NAN, INFINITY, -INFINITY};
@@ -512,10 +500,8 @@ static void a_sample_that_is_not_finite_is_rejected_and_restarts(void **state)
 
 static void a_frozen_identifier_drops_windows_and_resumes(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     uint32_t reasons[16];
-    start(&design, &config);
+    start();
     first_order rig = {.generator = 6u};
     (void)run(&rig, 20 * HOP, reasons);
     pvid_weak_freeze_f32(&self, true);
@@ -531,15 +517,13 @@ static void a_frozen_identifier_drops_windows_and_resumes(void **state)
 
 static void windows_beyond_a_range_or_without_motion_are_dropped(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     uint32_t reasons[16];
     const float range[2] = {10.0f, 10.0f};
     const float least[2] = {0.1f, 0.0f};
-    start(&design, &config);
+    start();
     config.range = range;
     config.drive_min = least;
-    assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+    init();
     first_order rig = {.generator = 9u};
     (void)run(&rig, 10 * HOP, reasons);
     assert_int_equal(reasons[PVID_HELD_OUT_OF_RANGE], 0);
@@ -562,12 +546,10 @@ static void windows_beyond_a_range_or_without_motion_are_dropped(void **state)
 /* A sensor that stands still from one tick on, then moves: windows with one such half are dropped too. */
 static void a_half_without_motion_drops_both_windows_that_it_is_in(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     const float least[2] = {0.0f, 0.1f};
-    start(&design, &config);
+    start();
     config.drive_min = least;
-    assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+    init();
     first_order rig = {.generator = 9u};
     uint32_t reasons[16];
     (void)run(&rig, 10 * HOP, reasons);
@@ -588,17 +570,15 @@ static void a_half_without_motion_drops_both_windows_that_it_is_in(void **state)
 /* Steps at which a sign is in doubt: up to a twentieth of a half, 2 of 48, are those of a reversal. */
 static void a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_in(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     const float doubt[1] = {0.125f};
     uint32_t all = 0u; /* rows of all windows */
     for (uint32_t steps = 0u; steps <= 3u; steps++) {
-        start(&design, &config);
+        start();
         design.sign_doubt = doubt;
         config.estimator.noise_margin = 0.0f; /* so fast a motion excites little: no solve is to be held for that */
         config.estimator.kappa_min = 0.0f;
         config.trust.kappa_min = 0.0f;
-        assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+        init();
         uint32_t dropped = 0u;
         for (uint32_t tick = 0u; tick < (10u * HOP); tick++) {
             const bool doubtful = (tick >= ((5u * HOP) + 8u)) && (tick < ((5u * HOP) + 8u + steps));
@@ -615,12 +595,10 @@ static void a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_i
 
 static void outliers_are_rejected_by_the_gate(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     uint32_t reasons[16];
-    start(&design, &config);
+    start();
     config.gate.sigmas = 4.0f;
-    assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+    init();
     first_order rig = {.generator = 10u};
     (void)run(&rig, 40 * HOP, reasons);
     float p[4];
@@ -639,13 +617,11 @@ static void outliers_are_rejected_by_the_gate(void **state)
  * estimate is withdrawn, and p starts at the trusted one, until the new one is known. */
 static void a_changed_mechanism_withdraws_until_it_is_known_anew(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
     uint32_t reasons[16];
-    start(&design, &config);
+    start();
     config.gate.sigmas = 4.0f;
     config.gate.patience_s = (float)(10.0 * HOP / RATE);
-    assert_int_equal(pvid_weak_init_f32(&self, &config), PVID_OK);
+    init();
     first_order rig = {.generator = 12u};
     (void)run(&rig, 40 * HOP, reasons);
     assert_int_equal(self.trust.estimate.standing.state, PVID_STANDING_VALID);
@@ -673,106 +649,34 @@ static void a_changed_mechanism_withdraws_until_it_is_known_anew(void **state)
 
 /* ---- init ---- */
 
+/* The tables of model and design: test_weak_valid.c; all numbers of the configuration: tests/core/test_bad_config.py.
+ */
 static void init_names_what_is_out_of_range(void **state)
 {
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
 #define REFUSES(what, status)                                                                                          \
     do {                                                                                                               \
-        start(&design, &config);                                                                                       \
-        pvid_weak_model_f32 model = mechanism;                                                                         \
-        design.model = &model;                                                                                         \
+        start();                                                                                                       \
         what;                                                                                                          \
         assert_int_equal(pvid_weak_init_f32(&self, &config), status);                                                  \
         assert_null(self.design);                                                                                      \
     } while (0)
-    static const pvid_weak_term_f32 of_high_order[5] = {
-        {U, 0, 0, 1.0f}, {X, 0, 1, -1.0f}, {ONE, 0, 2, 1.0f}, {SIGN, 0, 3, 1.0f}, {X, POWER - 1, 4, 1.0f}};
-    static const pvid_weak_term_f32 unsorted[5] = {
-        {U, 0, 1, 1.0f}, {X, 0, 0, -1.0f}, {ONE, 0, 2, 1.0f}, {SIGN, 0, 3, 1.0f}, {X, 1, 4, 1.0f}};
-    static const pvid_weak_kind one_theta_less[1] = {{3, 1, 0, 5}};
-    static const pvid_weak_filter_f32 without_weights[2] = {{0, NULL}, {3, NULL}};
     static const float negative[1] = {-1.0f};
     static const float zero_range[2] = {1.0f, 0.0f};
     static const float not_a_number[2] = {NAN, 0.0f};
-    static const uint8_t high[1] = {POWER};
-    static const pvid_weak_noise_f32 of_no_column[2] = {{0, 0, 1, 5, 1.0f}, {0, 1, 4, 4, 1.0f}};
-    static pvid_weak_channel wrong[CHANNELS];
-    REFUSES(config.sample_rate_hz = 0.0f, PVID_BAD_SAMPLE_RATE);
-    REFUSES(config.sample_rate_hz = NAN, PVID_BAD_SAMPLE_RATE);
     REFUSES(config.design = NULL, PVID_BAD_DESIGN);
     REFUSES(design.model = NULL, PVID_BAD_MODEL);
-    REFUSES(model.samples = 0, PVID_BAD_MODEL);
-    REFUSES(model.samples = 1, PVID_BAD_MODEL); /* a signal is of the second one */
-    REFUSES(model.jets = PVID_MAX_INPUTS, PVID_BAD_MODEL);
-    REFUSES(model.runs = PVID_MAX_INTEGRANDS + 1, PVID_BAD_MODEL);
-    REFUSES(model.kinds = 0, PVID_BAD_MODEL);
-    REFUSES(model.prepare = NULL, PVID_BAD_MODEL);
-    REFUSES(model.values = NULL, PVID_BAD_MODEL);
-    REFUSES(model.form = NULL, PVID_BAD_MODEL);
-    REFUSES(model.term = of_high_order, PVID_BAD_MODEL);
-    REFUSES(model.term = unsorted, PVID_BAD_MODEL);
-    REFUSES(model.kind = one_theta_less, PVID_BAD_MODEL);
-    for (int i = 0; i < 4; i++) {
-        memcpy(wrong, channels, sizeof wrong);
-        wrong[U_I2].fold = (i == 0) ? 3u : 2u;
-        wrong[U_I2].plain = (i == 1) ? (uint8_t)U_I1 : (uint8_t)U;
-        wrong[U_I2].ramp = (i == 2) ? (uint8_t)U_I1 : (uint8_t)U_T;
-        wrong[U_I2].integrand = (i == 3) ? 1u : 0u;
-        REFUSES(model.channel = wrong, PVID_BAD_MODEL);
-    }
-    REFUSES(design.decimation = 0, PVID_BAD_DECIMATION);
-    REFUSES(design.decimation = PVID_MAX_DECIMATION + 1, PVID_BAD_DECIMATION);
-    REFUSES(design.power = 3, PVID_BAD_DESIGN);
     REFUSES(design.functions = 3, PVID_BAD_FUNCTIONS);
-    REFUSES(design.functions = PVID_MAX_FUNCTIONS + 1, PVID_BAD_FUNCTIONS);
-    REFUSES(design.hop = 46, PVID_BAD_WINDOW);
-    REFUSES(design.hop = 4, PVID_BAD_WINDOW);
-    REFUSES(design.overlap = 0.5f, PVID_BAD_OVERLAP);
-    REFUSES(design.circle = NULL, PVID_BAD_DESIGN);
-    REFUSES(design.compensator = without_weights, PVID_BAD_DESIGN);
-    REFUSES(design.sign_width = negative, PVID_BAD_DESIGN);
-    REFUSES(design.sign_doubt = negative, PVID_BAD_DESIGN);
-    REFUSES(design.error_variance = negative, PVID_BAD_DESIGN);
-    REFUSES(design.error_order = high, PVID_BAD_DESIGN);
-    REFUSES(design.noise = of_no_column, PVID_BAD_DESIGN);
-    REFUSES(design.n_noise = 0, PVID_BAD_DESIGN); /* nothing that the rows could be weighted with */
+    REFUSES(config.sample_rate_hz = NAN, PVID_BAD_SAMPLE_RATE);
     REFUSES(config.range = zero_range, PVID_BAD_RANGE);
     REFUSES(config.drive_min = not_a_number, PVID_BAD_DRIVE_MIN);
-    REFUSES(config.iterations = 0, PVID_BAD_ITERATIONS);
-    REFUSES(config.estimator.start[0] = -1.0f, PVID_BAD_START);
-    REFUSES(config.trust.se_max = 0.0f, PVID_BAD_SE_MAX);
     REFUSES(config.trust.shared = not_a_number, PVID_BAD_SHARED);
-    REFUSES(config.gate.sigmas = 1.0f, PVID_BAD_GATE_SIGMAS);
-    assert_int_equal(pvid_weak_init_f32(&self, NULL), PVID_BAD_POINTER);
-    assert_int_equal(pvid_weak_init_f32(NULL, &config), PVID_BAD_POINTER);
-}
-
-static void an_object_before_its_init_does_nothing(void **state)
-{
-    static pvid_weak_f32 zero;
-    const float sample[2] = {0.0f, 0.0f};
-    pvid_estimate_f32 estimate;
-    assert_int_equal(pvid_weak_step_f32(&zero, sample), PVID_NOT_READY);
-    assert_int_equal(pvid_weak_step_f32(NULL, sample), PVID_NOT_READY);
-    assert_false(pvid_weak_read_f32(&zero, &estimate, NULL));
-    assert_null(pvid_weak_estimate_f32(NULL));
-    pvid_weak_gap_f32(&zero);
-    pvid_weak_freeze_f32(&zero, true);
-    assert_false(zero.frozen);
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
-    start(&design, &config);
-    assert_int_equal(pvid_weak_step_f32(&self, NULL), PVID_NOT_READY);
-    assert_false(pvid_weak_read_f32(&self, NULL, NULL));
+    REFUSES(design.sign_doubt = negative, PVID_BAD_DESIGN);
 }
 
 static void without_a_second_stage_there_is_no_snapshot_of_one(void **state)
 {
     static uint8_t image[PVID_SNAPSHOT_REFINE_F32];
-    pvid_weak_design_f32 design;
-    pvid_weak_config_f32 config;
-    start(&design, &config);
+    start();
     assert_int_equal(pvid_snapshot_save_refine_f32(&self, &config, 1, image, sizeof image), 0);
     assert_int_equal(pvid_snapshot_restore_refine_f32(&self, &config, image, sizeof image), PVID_SNAPSHOT_NOT_READY);
 }
@@ -797,30 +701,26 @@ static void a_nuisance_that_those_before_it_explain_is_skipped(void **state)
     assert_false(pvid_weak_columns_keep_f32(4, nothing, 0.0f, &inverse));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(parameters_are_found_within_their_errors),
-        cmocka_unit_test(scatter_of_the_windows_widens_the_standard_errors),
-        cmocka_unit_test(sums_are_those_of_the_definition),
-        cmocka_unit_test(rows_have_the_moments_of_generalised_least_squares),
-        cmocka_unit_test(jets_are_those_of_the_filters_for_every_decimation),
-        cmocka_unit_test(stages_are_as_many_as_counted),
-        cmocka_unit_test(assessment_takes_the_stated_number_of_stages),
-        cmocka_unit_test(a_window_that_cannot_be_processed_in_time_is_refused),
-        cmocka_unit_test(estimates_do_not_depend_on_the_slices_of_the_schedule),
-        cmocka_unit_test(a_gap_restarts_the_windows_and_keeps_the_sums),
-        cmocka_unit_test(a_sample_that_is_not_finite_is_rejected_and_restarts),
-        cmocka_unit_test(a_frozen_identifier_drops_windows_and_resumes),
-        cmocka_unit_test(windows_beyond_a_range_or_without_motion_are_dropped),
-        cmocka_unit_test(a_half_without_motion_drops_both_windows_that_it_is_in),
-        cmocka_unit_test(a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_in),
-        cmocka_unit_test(outliers_are_rejected_by_the_gate),
-        cmocka_unit_test(a_changed_mechanism_withdraws_until_it_is_known_anew),
-        cmocka_unit_test(init_names_what_is_out_of_range),
-        cmocka_unit_test(an_object_before_its_init_does_nothing),
-        cmocka_unit_test(without_a_second_stage_there_is_no_snapshot_of_one),
-        cmocka_unit_test(a_nuisance_that_those_before_it_explain_is_skipped),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(parameters_are_found_within_their_errors),
+    cmocka_unit_test(scatter_of_the_windows_widens_the_standard_errors),
+    cmocka_unit_test(sums_are_those_of_the_definition),
+    cmocka_unit_test(rows_have_the_moments_of_generalised_least_squares),
+    cmocka_unit_test(jets_are_those_of_the_filters_for_every_decimation),
+    cmocka_unit_test(stages_are_as_many_as_counted),
+    cmocka_unit_test(assessment_takes_the_stated_number_of_stages),
+    cmocka_unit_test(a_window_that_cannot_be_processed_in_time_is_refused),
+    cmocka_unit_test(estimates_do_not_depend_on_the_slices_of_the_schedule),
+    cmocka_unit_test(a_gap_restarts_the_windows_and_keeps_the_sums),
+    cmocka_unit_test(a_sample_that_is_not_finite_is_rejected_and_restarts),
+    cmocka_unit_test(a_frozen_identifier_drops_windows_and_resumes),
+    cmocka_unit_test(windows_beyond_a_range_or_without_motion_are_dropped),
+    cmocka_unit_test(a_half_without_motion_drops_both_windows_that_it_is_in),
+    cmocka_unit_test(a_half_with_a_sign_in_doubt_for_long_drops_both_windows_that_it_is_in),
+    cmocka_unit_test(outliers_are_rejected_by_the_gate),
+    cmocka_unit_test(a_changed_mechanism_withdraws_until_it_is_known_anew),
+    cmocka_unit_test(init_names_what_is_out_of_range),
+    cmocka_unit_test(without_a_second_stage_there_is_no_snapshot_of_one),
+    cmocka_unit_test(a_nuisance_that_those_before_it_explain_is_skipped),
+};
+RUN(tests)

@@ -122,15 +122,12 @@ static void test_the_largest_residual_is_kept(void **state)
     assert_int_equal(error_q31.mean, (int32_t)1 << 29);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_residuals_that_stay_large_raise_it),
-        cmocka_unit_test(test_residuals_that_are_not_far_off_leave_it_alone),
-        cmocka_unit_test(test_it_falls_with_them_but_not_below_the_design_s),
-        cmocka_unit_test(test_single_windows_change_nothing),
-        cmocka_unit_test(test_what_is_no_variance_is_not_taken),
-        cmocka_unit_test(test_the_largest_residual_is_kept),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(test_residuals_that_stay_large_raise_it),
+    cmocka_unit_test(test_residuals_that_are_not_far_off_leave_it_alone),
+    cmocka_unit_test(test_it_falls_with_them_but_not_below_the_design_s),
+    cmocka_unit_test(test_single_windows_change_nothing),
+    cmocka_unit_test(test_what_is_no_variance_is_not_taken),
+    cmocka_unit_test(test_the_largest_residual_is_kept),
+};
+RUN(tests)

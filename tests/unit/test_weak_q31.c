@@ -430,25 +430,22 @@ static void ticks_without_work_have_their_answer(void **state)
     assert_true(idle > (uint32_t)PLANT_HOP_TICKS);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(the_pendulum_is_identified_with_its_encoders_zero, start_again),
-        cmocka_unit_test_setup(a_reading_beyond_full_scale_restarts_windows_and_keeps_sums, start_again),
-        cmocka_unit_test_setup(a_gap_is_a_reading_beyond_full_scale_without_the_reading, start_again),
-        cmocka_unit_test_setup(start_is_held_with_reason_without_drive, start_again),
-        cmocka_unit_test_setup(laws_and_forgetting_take_their_settings, start_again),
-        cmocka_unit_test_setup(frozen_form_keeps_sums_and_resumes_bumplessly, start_again),
-        cmocka_unit_test_setup(the_gate_keeps_a_jolt_out, start_again),
-        cmocka_unit_test_setup(random_counts_keep_every_bound, start_again),
-        cmocka_unit_test_setup(a_window_takes_the_stages_that_init_counts_with, start_again),
-        cmocka_unit_test_setup(the_noise_is_computed_where_it_is_used, start_again),
-        cmocka_unit_test_setup(ticks_behind_the_join_are_those_without_harmonics, start_again),
-        cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
-        cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
-        cmocka_unit_test(the_lead_is_what_the_front_end_needs),
-        cmocka_unit_test(signals_of_several_ticks_are_those_of_their_definition),
-        cmocka_unit_test(ticks_without_work_have_their_answer),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup(the_pendulum_is_identified_with_its_encoders_zero, start_again),
+    cmocka_unit_test_setup(a_reading_beyond_full_scale_restarts_windows_and_keeps_sums, start_again),
+    cmocka_unit_test_setup(a_gap_is_a_reading_beyond_full_scale_without_the_reading, start_again),
+    cmocka_unit_test_setup(start_is_held_with_reason_without_drive, start_again),
+    cmocka_unit_test_setup(laws_and_forgetting_take_their_settings, start_again),
+    cmocka_unit_test_setup(frozen_form_keeps_sums_and_resumes_bumplessly, start_again),
+    cmocka_unit_test_setup(the_gate_keeps_a_jolt_out, start_again),
+    cmocka_unit_test_setup(random_counts_keep_every_bound, start_again),
+    cmocka_unit_test_setup(a_window_takes_the_stages_that_init_counts_with, start_again),
+    cmocka_unit_test_setup(the_noise_is_computed_where_it_is_used, start_again),
+    cmocka_unit_test_setup(ticks_behind_the_join_are_those_without_harmonics, start_again),
+    cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
+    cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
+    cmocka_unit_test(the_lead_is_what_the_front_end_needs),
+    cmocka_unit_test(signals_of_several_ticks_are_those_of_their_definition),
+    cmocka_unit_test(ticks_without_work_have_their_answer),
+};
+RUN(tests)

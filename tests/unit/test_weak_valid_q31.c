@@ -363,20 +363,17 @@ static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
     COUNTS(design.sum_shift++);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_either_core_refuses),
-        cmocka_unit_test(counts_of_a_model),
-        cmocka_unit_test(pointers_of_model_and_design),
-        cmocka_unit_test(sizes_of_a_design),
-        cmocka_unit_test(tables_of_a_model),
-        cmocka_unit_test(several_kinds),
-        cmocka_unit_test(full_scales_and_filters),
-        cmocka_unit_test(noise_of_the_sensors),
-        cmocka_unit_test(shifts),
-        cmocka_unit_test(the_configuration),
-        cmocka_unit_test(every_entry_of_a_table_counts_in_the_fingerprint),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(what_either_core_refuses),
+    cmocka_unit_test(counts_of_a_model),
+    cmocka_unit_test(pointers_of_model_and_design),
+    cmocka_unit_test(sizes_of_a_design),
+    cmocka_unit_test(tables_of_a_model),
+    cmocka_unit_test(several_kinds),
+    cmocka_unit_test(full_scales_and_filters),
+    cmocka_unit_test(noise_of_the_sensors),
+    cmocka_unit_test(shifts),
+    cmocka_unit_test(the_configuration),
+    cmocka_unit_test(every_entry_of_a_table_counts_in_the_fingerprint),
+};
+RUN(tests)

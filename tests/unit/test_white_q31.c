@@ -103,11 +103,8 @@ static void means_of_scores_are_those_of_their_windows(void **state)
     assert_false(self.known);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_spectrum_is_that_of_its_definition),
-        cmocka_unit_test(means_of_scores_are_those_of_their_windows),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(the_spectrum_is_that_of_its_definition),
+    cmocka_unit_test(means_of_scores_are_those_of_their_windows),
+};
+RUN(tests)
