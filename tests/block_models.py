@@ -131,139 +131,116 @@ class BlockModelQ31:
 
 
 class EstimatorInC:
-    """pvid_estimator_f32 on a block model."""
+    """pvid_estimator_<core> on a block model, which chooses the core.
 
-    def __init__(self, native: Native, model: BlockModel, config: EstimatorConfig, rate: float) -> None:
+    rate: of the groups [Hz], in float32.
+    """
+
+    def __init__(
+        self,
+        native: Native,
+        model: BlockModel | BlockModelQ31,
+        config: EstimatorConfig | EstimatorConfigQ31,
+        rate: float | None = None,
+    ) -> None:
         ffi = native.headers.ffi
+        real = model.real if isinstance(model, BlockModelQ31) else model
+        self._fixed = isinstance(model, BlockModelQ31)
+        self.core = "q31" if self._fixed else "f32"
         self.native, self.ffi, self.library = native, ffi, native.library
-        self.n_p, self.n_theta = model.n_p, model.n_theta
+        self.n_p, self.n_theta = real.n_p, real.n_theta
+        self.n_moments = sum((k.stop - k.start) * (k.stop - k.start + 1) // 2 for k in real.kinds)
+        self.model = ffi.new(f"pvid_model_{self.core} *")
+        self._config = native.headers.filled(f"pvid_estimator_config_{self.core}", config)
+        self._config.struct.model = self.model
+        self.state = ffi.new(f"pvid_estimator_{self.core} *")
+        self._fill(model, real)
+        if rate is not None:
+            self._config.struct.update_rate_hz = rate
+        given = ffi.addressof(self._config.struct)
+        assert self._called("init_layout", given, self.library.pvid_layout()) == 0
+
+    def _fill(self, model: BlockModel | BlockModelQ31, real: BlockModel) -> None:
+        ffi = self.ffi
+        types = "const int32_t *, int64_t *" if self._fixed else "const float *, float *"
 
         def filled(function: Any) -> Any:
             def call(p: Any, out: Any) -> None:
-                values = function(np.array([p[a] for a in range(model.n_p)], np.float32))
+                values = function(np.array([p[a] for a in range(real.n_p)], np.int64 if self._fixed else np.float32))
                 for i, value in enumerate(values):
-                    out[i] = float(value)
+                    out[i] = value.item()
 
-            return ffi.callback("void(*)(const float *, float *)", call)
+            return ffi.callback(f"void(*)({types})", call)
 
-        columns, rows = zip(*model.non_zeros, strict=True)
-        several = len(model.kind_end) > 1
-        self._owned = [
-            ffi.new("uint8_t[]", list(rows)),
-            ffi.new("uint8_t[]", list(columns)),
-            ffi.new("uint8_t[]", list(model.kind_end)),
-            filled(model.theta),
-            filled(model.jacobian),
-        ]
-        self.n_moments = sum((k.stop - k.start) * (k.stop - k.start + 1) // 2 for k in model.kinds)
-        self.model = ffi.new("pvid_model_f32 *")
-        self.model.n_theta, self.model.n_p, self.model.n_c = model.n_theta, model.n_p, len(rows)
-        self.model.n_moments, self.model.positive = self.n_moments, 2**model.n_p - 1
-        self.model.n_kinds = len(model.kind_end) if several else 0
+        columns, rows = zip(*real.non_zeros, strict=True)
+        several = len(real.kind_end) > 1
+        self._owned = [ffi.new("uint8_t[]", list(one)) for one in (rows, columns, real.kind_end)]
+        self._owned += [filled(model.theta), filled(model.jacobian)]
+        self.model.n_theta, self.model.n_p, self.model.n_c = real.n_theta, real.n_p, len(rows)
+        self.model.positive = 2**real.n_p - 1
+        self.model.n_kinds = len(real.kind_end) if several else 0
         self.model.c_row, self.model.c_column, kind_end, self.model.theta, self.model.jacobian = self._owned
         self.model.kind_end = kind_end if several else ffi.NULL
-        self._filled = native.headers.filled("pvid_estimator_config_f32", config)
-        self._filled.struct.model = self.model
-        self._filled.struct.update_rate_hz = rate
-        self.state = ffi.new("pvid_estimator_f32 *")
-        assert (
-            self.library.pvid_estimator_init_layout_f32(
-                self.state, ffi.addressof(self._filled.struct), self.library.pvid_layout()
-            )
-            == 0
-        )
+        if isinstance(model, BlockModelQ31):
 
-    def add(self, kind: int, n: Float32, y: float) -> int:
+            def formats(p_bits: Any, theta_bits: Any, c_bits: Any) -> None:
+                for out, values in zip(
+                    (theta_bits, c_bits), model.formats([p_bits[a] for a in range(real.n_p)]), strict=True
+                ):
+                    for i, bits in enumerate(values):
+                        out[i] = bits
+
+            self._owned.append(ffi.callback("void(*)(const int8_t *, int16_t *, int16_t *)", formats))
+            self.model.formats = self._owned[-1]
+        else:
+            self.model.n_moments = self.n_moments
+
+    def _called(self, verb: str, *given: Any) -> int:
+        return int(getattr(self.library, f"pvid_estimator_{verb}_{self.core}")(self.state, *given))
+
+    def _numbers(self, values: npt.NDArray[Any]) -> Any:
+        return self.ffi.new("int32_t[]" if self._fixed else "float[]", np.asarray(values).tolist())
+
+    def add(self, kind: int, n: npt.NDArray[Any], y: float) -> int:
         """Adds a row of a kind; returns the reason."""
-        row = self.ffi.new("float[]", [float(x) for x in n])
-        return int(self.library.pvid_estimator_add_kind_f32(self.state, kind, row, float(y)))
+        return self._called("add_kind", kind, self._numbers(n), int(y) if self._fixed else float(y))
 
-    def add_to_b(self, g: Float32) -> int:
-        """Adds g [n_theta] to b; returns the reason."""
-        return int(self.library.pvid_estimator_add_to_b_f32(self.state, self.ffi.new("float[]", [float(x) for x in g])))
+    def add_to_b(self, g: npt.NDArray[Any], e: Int | None = None) -> int:
+        """Adds g [n_theta], in fixed point g 2^e, to b; returns the reason."""
+        if e is None:
+            return self._called("add_to_b", self._numbers(g))
+        scaled = [{"m": int(a), "e": int(b)} for a, b in zip(g, e, strict=True)]
+        return self._called("add_to_b", self.ffi.new("pvid_scaled_q31[]", scaled))
 
     def update(self) -> int:
         """Ends a group; returns the reason."""
-        return int(self.library.pvid_estimator_update_f32(self.state))
+        return self._called("update")
 
     def iterate(self) -> int:
         """A further step; returns the reason."""
-        return int(self.library.pvid_estimator_iterate_f32(self.state))
+        return self._called("iterate")
 
     def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimate_f32, shape ()."""
-        out = np.empty((), self.native.headers.dtype("pvid_estimate_f32"))
-        self.library.pvid_estimator_assess_f32(self.state, self.native.headers.pointer(out))
+        """pvid_estimate_<core>, shape ()."""
+        out = np.empty((), self.native.headers.dtype(f"pvid_estimate_{self.core}"))
+        getattr(self.library, f"pvid_estimator_assess_{self.core}")(self.state, self.native.headers.pointer(out))
         return out
 
     @property
-    def p(self) -> Float32:
+    def p(self) -> npt.NDArray[Any]:
         """[n_p]"""
-        return np.array(list(self.state.p)[: self.n_p], np.float32)
+        return np.array(list(self.state.p)[: self.n_p], np.int64 if self._fixed else np.float32)
 
     @property
     def levels(self) -> Float32:
-        """Both levels of the sums [2, n_sums]."""
+        """In float32 both levels of the sums [2, n_sums]."""
         n = self.n_moments + self.n_theta + 2
         information = self.state.information
         return np.array([list(information.high)[:n], list(information.low)[:n]], np.float32)
 
     @property
-    def counters(self) -> dict[str, int]:
-        """By name."""
-        counters = self.state.counters
-        return {name: int(getattr(counters, name)) for name, _ in self.ffi.typeof(counters).fields}
-
-
-class Q31InC:
-    """pvid_estimator_q31 on the model that a pointer points to."""
-
-    def __init__(self, native: Native, model: Any, config: EstimatorConfigQ31) -> None:
-        ffi = native.headers.ffi
-        self.native, self.ffi, self.library = native, ffi, native.library
-        self.n_p = int(model.n_p)
-        self._filled = native.headers.filled("pvid_estimator_config_q31", config)
-        self._filled.struct.model = model
-        self.state = ffi.new("pvid_estimator_q31 *")
-        assert (
-            self.library.pvid_estimator_init_layout_q31(
-                self.state, ffi.addressof(self._filled.struct), self.library.pvid_layout()
-            )
-            == 0
-        )
-
-    def add(self, kind: int, n: Int, y: int) -> int:
-        """Adds a row of a kind; returns the reason."""
-        row = self.ffi.new("int32_t[]", [int(x) for x in n])
-        return int(self.library.pvid_estimator_add_kind_q31(self.state, kind, row, int(y)))
-
-    def add_to_b(self, m: Int, e: Int) -> int:
-        """Adds m 2^e [n_theta] to b; returns the reason."""
-        g = self.ffi.new("pvid_scaled_q31[]", [{"m": int(a), "e": int(b)} for a, b in zip(m, e, strict=True)])
-        return int(self.library.pvid_estimator_add_to_b_q31(self.state, g))
-
-    def update(self) -> int:
-        """Ends a group; returns the reason."""
-        return int(self.library.pvid_estimator_update_q31(self.state))
-
-    def iterate(self) -> int:
-        """A further step; returns the reason."""
-        return int(self.library.pvid_estimator_iterate_q31(self.state))
-
-    def assess(self) -> npt.NDArray[np.void]:
-        """pvid_estimate_q31, shape ()."""
-        out = np.empty((), self.native.headers.dtype("pvid_estimate_q31"))
-        self.library.pvid_estimator_assess_q31(self.state, self.native.headers.pointer(out))
-        return out
-
-    @property
-    def p(self) -> Int:
-        """[n_p]"""
-        return np.array(list(self.state.p)[: self.n_p], np.int64)
-
-    @property
     def sums(self) -> Int:
-        """[n_sums]"""
+        """In fixed point [n_sums]."""
         information = self.state.information
         return np.array(list(information.sums)[: information.n_sums], np.int64)
 
@@ -272,44 +249,3 @@ class Q31InC:
         """By name."""
         counters = self.state.counters
         return {name: int(getattr(counters, name)) for name, _ in self.ffi.typeof(counters).fields}
-
-
-class EstimatorQ31InC(Q31InC):
-    """pvid_estimator_q31 on a block model."""
-
-    def __init__(self, native: Native, model: BlockModelQ31, config: EstimatorConfigQ31) -> None:
-        ffi = native.headers.ffi
-        real = model.real
-
-        def filled(function: Any) -> Any:
-            def call(p: Any, out: Any) -> None:
-                for i, value in enumerate(function(np.array([p[a] for a in range(real.n_p)], np.int64))):
-                    out[i] = int(value)
-
-            return ffi.callback("void(*)(const int32_t *, int64_t *)", call)
-
-        def formats(p_bits: Any, theta_bits: Any, c_bits: Any) -> None:
-            theta, c = model.formats([p_bits[a] for a in range(real.n_p)])
-            for i, bits in enumerate(theta):
-                theta_bits[i] = bits
-            for k, bits in enumerate(c):
-                c_bits[k] = bits
-
-        columns, rows = zip(*real.non_zeros, strict=True)
-        several = len(real.kind_end) > 1
-        self._owned = [
-            ffi.new("uint8_t[]", list(rows)),
-            ffi.new("uint8_t[]", list(columns)),
-            ffi.new("uint8_t[]", list(real.kind_end)),
-            filled(model.theta),
-            filled(model.jacobian),
-            ffi.callback("void(*)(const int8_t *, int16_t *, int16_t *)", formats),
-        ]
-        self.model = ffi.new("pvid_model_q31 *")
-        self.model.n_theta, self.model.n_p, self.model.n_c = real.n_theta, real.n_p, len(rows)
-        self.model.positive = 2**real.n_p - 1
-        self.model.n_kinds = len(real.kind_end) if several else 0
-        row, column, kind_end, self.model.theta, self.model.jacobian, self.model.formats = self._owned
-        self.model.c_row, self.model.c_column = row, column
-        self.model.kind_end = kind_end if several else ffi.NULL
-        super().__init__(native, self.model, config)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from block_models import BlockModelQ31, EstimatorQ31InC, Int
+from block_models import BlockModelQ31, EstimatorInC, Int
 from printed_estimator import PrintedEstimator, block_model, printed_core
 
 from pvid.core.native import Native
@@ -40,7 +40,7 @@ def against_twin(native: Native, config: EstimatorConfigQ31, n: Int, y: Int) -> 
     """Steps the core and the twin through rows N [ticks, 8], Y [ticks], a group each; all integers must be equal."""
     module, steps = printed_core("q31"), []
     core, twin = (
-        EstimatorQ31InC(native, MODEL, config),
+        EstimatorInC(native, MODEL, config),
         PrintedEstimator(native, module, block_model(module, MODEL), config),
     )
     for tick in range(len(y)):

@@ -1,74 +1,123 @@
-"""Rows of several kinds: M by blocks. C against twin bit for bit, both against float64."""
+"""Rows of several kinds: M by blocks. C against twin in every bit, both against float64, in either arithmetic."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from block_models import BlockModel, EstimatorInC
+from block_models import BlockModel, BlockModelQ31, EstimatorInC
 from printed_estimator import PrintedEstimator, block_model, printed_core
 
 from pvid.core.native import Native
-from pvid.settings.enums import Law, Reason
+from pvid.settings.cores import CORES
+from pvid.settings.enums import Core, Law, Reason
 from pvid.settings.parts import EstimatorConfig
+from pvid.settings.q31 import EstimatorConfigQ31
 
-Float32 = npt.NDArray[np.float32]
+AnyModel = BlockModel | BlockModelQ31
+AnyConfig = EstimatorConfig | EstimatorConfigQ31
+Numbers = npt.NDArray[Any]
+Group = list[tuple[int, Numbers, float]]
 
 RATE = 100.0
 ROW_SD = 0.02
+P_BITS, N_BITS, Y_BITS = 27, 20, 18
+ONE = 2**30
+UNITS: dict[Core, tuple[float, float, float]] = {"f32": (1.0, 1.0, 1.0), "q31": (2.0**P_BITS, 2.0**N_BITS, 2.0**Y_BITS)}
 KINDS = {"two": (4, 9), "three": (3, 5, 10), "uneven": (1, 9)}
-CONFIGS = {
-    "plain": {},
-    "forgetting": {"forgetting_s": 0.4},  # 40 groups: folds after every second
-    "rate": {"feedback_hz": 20.0, "forgetting_s": 1.0},  # g = 0.2: the innovation's gradient
-    "pseudovelocity": {"law": Law.PSEUDOVELOCITY},
-    "divider": {"divider": 3, "row_weight": 0.75, "correlation": 2.0},
-    "dead zone": {"dead_zone": 0.5},
+CONFIGS: dict[str, dict[Core, dict[str, Any]]] = {
+    "plain": {"f32": {}, "q31": {}},
+    "forgetting": {"f32": {"forgetting_s": 0.4}, "q31": {"forgetting_groups": 40}},  # folds after every second group
+    # g = 0.2: the innovation's gradient
+    "rate": {"f32": {"feedback_hz": 20.0, "forgetting_s": 1.0}, "q31": {"gain": ONE // 5, "forgetting_groups": 100}},
+    "pseudovelocity": {"f32": {"law": Law.PSEUDOVELOCITY}, "q31": {"gain": 0}},
+    "divider": {
+        "f32": {"divider": 3, "row_weight": 0.75, "correlation": 2.0},
+        "q31": {"divider": 3, "row_weight": 49152, "correlation": 2 << 16},
+    },
+    "dead zone": {"f32": {"dead_zone": 0.5}, "q31": {"dead_zone": 1 << 15}},
+}
+NO_PRIOR: dict[Core, dict[str, Any]] = {
+    "f32": {"start_sd": np.full(4, 1e4, np.float32), "correlation": 1.5},
+    "q31": {"start_sd": (2**31 - 1,) * 4, "correlation": 3 << 15},
 }
 
 
-def config_of(model: BlockModel, **fields: object) -> EstimatorConfig:
-    ones = np.ones(model.n_p, np.float32)
-    start = EstimatorConfig(
-        start=1.5 * ones, start_sd=ones, lower=0.1 * ones, upper=10 * ones, row_sd=ROW_SD, noise_margin=0.0
-    )
+def real_of(model: AnyModel) -> BlockModel:
+    return model.real if isinstance(model, BlockModelQ31) else model
+
+
+def random_model(core: Core, random: np.random.Generator, kind_end: tuple[int, ...], n_p: int = 4) -> AnyModel:
+    return (BlockModel if core == "f32" else BlockModelQ31).random(random, kind_end, n_p)
+
+
+def config_of(model: AnyModel, **fields: object) -> AnyConfig:
+    n_p = real_of(model).n_p
+    if isinstance(model, BlockModel):
+        ones = np.ones(n_p, np.float32)
+        start: AnyConfig = EstimatorConfig(
+            start=1.5 * ones, start_sd=ones, lower=0.1 * ones, upper=10 * ones, row_sd=ROW_SD, noise_margin=0.0
+        )
+    else:
+        unit = 2**P_BITS
+        start = EstimatorConfigQ31(
+            start=(3 * unit // 2,) * n_p,
+            start_sd=(unit,) * n_p,
+            lower=(unit // 10,) * n_p,
+            upper=(10 * unit,) * n_p,
+            p_bits=(P_BITS,) * n_p,
+            n_bits=(N_BITS,) * model.real.n_theta,
+            y_bits=Y_BITS,
+            row_sd=round(ROW_SD * 2 ** (Y_BITS + 8)),
+            noise_margin=0,
+        )
     return replace(start, **fields)  # type: ignore[arg-type]
 
 
-def rows_of(
-    model: BlockModel, random: np.random.Generator, groups: int
-) -> tuple[Float32, list[list[tuple[int, Float32, float]]]]:
-    """The true p, and groups of rows (kind, N, Y): a few of each kind."""
-    p = random.uniform(0.8, 2.5, model.n_p)
-    theta = model.theta(p)
+def rows_of(model: AnyModel, random: np.random.Generator, groups: int) -> tuple[Numbers, list[Group]]:
+    """The true p, and groups of rows (kind, N, Y) as the core takes them: two of each kind."""
+    real = real_of(model)
+    p = random.uniform(0.8, 2.5, real.n_p)
+    theta = real.theta(p)
     made = []
     for _ in range(groups):
-        group = []
-        for kind, own in enumerate(model.kinds):
+        group: Group = []
+        for kind, own in enumerate(real.kinds):
             for _ in range(2):
                 n = random.standard_normal(own.stop - own.start)
                 y = float(n @ theta[own]) + ROW_SD * random.standard_normal()
-                group.append((kind, n.astype(np.float32), y))
+                if isinstance(model, BlockModel):
+                    group.append((kind, n.astype(np.float32), y))
+                else:
+                    group.append((kind, np.round(n * 2**N_BITS).astype(np.int64), round(y * 2**Y_BITS)))
         made.append(group)
-    return p.astype(np.float32), made
+    return p, made
 
 
 class Pair:
-    """The estimator in C and its twin."""
+    """The estimator in C and its twin; sizes: of the core that is not the default one."""
 
-    def __init__(self, native: Native, model: BlockModel, config: EstimatorConfig) -> None:
-        self.core = EstimatorInC(native, model, config, RATE)
-        module = printed_core("f32")
-        self.twin = PrintedEstimator(native, module, block_model(module, model), config, RATE)
+    def __init__(
+        self, native: Native, model: AnyModel, config: AnyConfig, sizes: Mapping[str, int] | None = None
+    ) -> None:
+        self.type: Core = "f32" if isinstance(model, BlockModel) else "q31"
+        rate = RATE if self.type == "f32" else None
+        self.core = EstimatorInC(native, model, config, rate)
+        module = printed_core(self.type, sizes)
+        self.twin = PrintedEstimator(native, module, block_model(module, model), config, rate)
 
-    def add(self, kind: int, n: Float32, y: float) -> Reason:
+    def add(self, kind: int, n: Numbers, y: float) -> Reason:
         reason = self.twin.add(kind, n, y)
         assert self.core.add(kind, n, y) == reason
         return Reason(reason)
 
-    def add_to_b(self, g: Float32) -> Reason:
-        reason = self.twin.add_to_b(g)
-        assert self.core.add_to_b(g) == reason
+    def add_to_b(self, *g: Numbers) -> Reason:
+        reason = self.twin.add_to_b(*g)
+        assert self.core.add_to_b(*g) == reason
         return Reason(reason)
 
     def solve(self, ends_group: bool) -> None:
@@ -76,33 +125,101 @@ class Pair:
         assert own == other
 
     def assert_equal(self) -> None:
-        assert self.core.p.tobytes() == self.twin.p.tobytes()
-        assert self.core.levels.tobytes() == self.twin.levels.tobytes()
-        assert self.core.state.information.rounding == self.twin.state.information.rounding
+        """In p, the sums, and what the sums are rounded to or divided by."""
+        sums, scale = ("levels", "rounding") if self.type == "f32" else ("sums", "exponent")
+        for one in ("p", sums):
+            assert getattr(self.core, one).tobytes() == getattr(self.twin, one).tobytes(), one
+        assert getattr(self.core.state.information, scale) == getattr(self.twin.state.information, scale)
+
+    def anything(self, random: np.random.Generator) -> tuple[Numbers, ...]:
+        """What may be added to b."""
+        n_theta = self.core.n_theta
+        if self.type == "f32":
+            return (random.standard_normal(n_theta).astype(np.float32) * np.float32(1e-3),)
+        return random.integers(-ONE, ONE, n_theta), random.integers(-8, 0, n_theta)
 
 
-@pytest.mark.by_day(6)
-@pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS.keys())
+@pytest.mark.by_day(12)
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("name", CONFIGS)
 @pytest.mark.parametrize("kind_end", KINDS.values(), ids=KINDS.keys())
-def test_core_and_twin_have_the_same_bits(native: Native, kind_end: tuple[int, ...], fields: dict[str, object]) -> None:
+def test_core_and_twin_have_the_same_bits(native: Native, kind_end: tuple[int, ...], name: str, core: Core) -> None:
     random = np.random.default_rng(sum(kind_end))
-    model = BlockModel.random(random, kind_end, 4)
-    pair = Pair(native, model, config_of(model, **fields))
+    model = random_model(core, random, kind_end)
+    pair = Pair(native, model, config_of(model, **CONFIGS[name][core]))
     truth, groups = rows_of(model, random, 130)
     for number, group in enumerate(groups):
         for kind, n, y in group:
             assert pair.add(kind, n, y) is Reason.ACCUMULATED
         if number % 10 == 3:
-            pair.add_to_b(random.standard_normal(model.n_theta).astype(np.float32) * np.float32(1e-3))
+            pair.add_to_b(*pair.anything(random))
         pair.solve(ends_group=True)
         if number % 4 == 1:
             pair.solve(ends_group=False)
         pair.assert_equal()
     assert pair.core.assess().tobytes() == pair.twin.assess().tobytes()
     assert pair.core.counters == pair.twin.counters
-    assert pair.core.counters["in_dead_zone"] > 0 or "dead_zone" not in fields
+    assert pair.core.counters["in_dead_zone"] > 0 or name != "dead zone"
     # rough: the laws without iteration, and what was added to b, leave more than the rows' noise
-    assert np.allclose(pair.core.p, truth, rtol=0.05)
+    assert np.allclose(pair.core.p / UNITS[core][0], truth, rtol=0.05)
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("name", CONFIGS)
+def test_blocks_equal_full_rows_with_zeros(native: Native, name: str, core: Core) -> None:
+    """Products with zero change no sum: the estimates have the same bits."""
+    random = np.random.default_rng(8)
+    model = random_model(core, random, (4, 10))
+    real = real_of(model)
+    whole = real.whole() if core == "f32" else BlockModelQ31(real.whole())
+    config, rate = config_of(model, **CONFIGS[name][core]), RATE if core == "f32" else None
+    blocks, full = (EstimatorInC(native, one, config, rate) for one in (model, whole))
+    _, groups = rows_of(model, random, 80)
+    for group in groups:
+        for kind, n, y in group:
+            row = np.zeros(real.n_theta, n.dtype)
+            row[real.kinds[kind]] = n
+            assert blocks.add(kind, n, y) == full.add(0, row, y) == Reason.ACCUMULATED
+        assert blocks.update() == full.update()
+        assert blocks.iterate() == full.iterate()
+        assert np.array_equal(blocks.p, full.p)
+    assert blocks.assess().tobytes() == full.assess().tobytes()
+    sums, more = (one.levels[0] if core == "f32" else one.sums for one in (blocks, full))
+    assert (len(sums), len(more)) == (10 + 21 + 10 + 2, 55 + 10 + 2)
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("kind_end", KINDS.values(), ids=KINDS.keys())
+def test_the_estimate_is_that_of_least_squares(native: Native, kind_end: tuple[int, ...], core: Core) -> None:
+    """p and its standard errors against a Gauss-Newton solution of all rows in float64."""
+    random = np.random.default_rng(17)
+    model = random_model(core, random, kind_end)
+    real, (p_unit, n_unit, y_unit) = real_of(model), UNITS[core]
+    p, groups = rows_of(model, random, 100)
+    own = EstimatorInC(native, model, config_of(model, **NO_PRIOR[core]), RATE if core == "f32" else None)
+    n_all, y_all = [], []
+    for group in groups:
+        for kind, n, y in group:
+            own.add(kind, n, y)
+            row = np.zeros(real.n_theta)
+            row[real.kinds[kind]] = n / n_unit
+            n_all.append(row)
+            y_all.append(float(np.float32(y)) if core == "f32" else y / y_unit)
+        own.update()
+        own.iterate()
+    n_rows, y_rows = np.array(n_all), np.array(y_all)
+    for _ in range(20):
+        c = n_rows @ real.dense(p)
+        p = p + np.linalg.lstsq(c, y_rows - n_rows @ real.theta(p), rcond=None)[0]
+    rss = float(np.sum((y_rows - n_rows @ real.theta(p)) ** 2))
+    covariance = np.linalg.inv(c.T @ c) * (1.5 * rss / (len(y_rows) - 4))
+    se = np.sqrt(np.diag(covariance))
+    # float32 sums of 400 to 600 rows; 2^-18 of Y is 2e-4 of a row's noise, the prior of 16 units 1e-6 of the data
+    assert np.all(np.abs(own.p / p_unit - p) < (0.02 if core == "f32" else 0.01) * se)
+    estimate = own.assess()
+    assert np.allclose(estimate["se"][:4] / p_unit, se, rtol=1e-3)
+    if core == "f32":
+        assert np.allclose(estimate["covariance"][:4, :4], covariance, rtol=1e-3, atol=1e-3 * se.min() ** 2)
 
 
 def test_a_copy_of_the_state_continues_with_the_same_bits(native: Native) -> None:
@@ -126,59 +243,6 @@ def test_a_copy_of_the_state_continues_with_the_same_bits(native: Native) -> Non
             one.update()
     assert first.p.tobytes() == second.p.tobytes()
     assert first.levels.tobytes() == second.levels.tobytes()
-
-
-@pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS.keys())
-def test_blocks_equal_full_rows_with_zeros(native: Native, fields: dict[str, object]) -> None:
-    """Products with zero change no sum: the estimates have the same bits."""
-    random = np.random.default_rng(8)
-    model = BlockModel.random(random, (4, 10), 4)
-    config = config_of(model, **fields)
-    blocks, whole = EstimatorInC(native, model, config, RATE), EstimatorInC(native, model.whole(), config, RATE)
-    _, groups = rows_of(model, random, 80)
-    for group in groups:
-        for kind, n, y in group:
-            full = np.zeros(model.n_theta, np.float32)
-            full[model.kinds[kind]] = n
-            assert blocks.add(kind, n, y) == whole.add(0, full, y) == Reason.ACCUMULATED
-        assert blocks.update() == whole.update()
-        assert blocks.iterate() == whole.iterate()
-        assert np.array_equal(blocks.p, whole.p)
-    assert blocks.assess().tobytes() == whole.assess().tobytes()
-    assert blocks.n_moments == 10 + 21
-    assert whole.n_moments == 55
-
-
-@pytest.mark.parametrize("kind_end", KINDS.values(), ids=KINDS.keys())
-def test_the_estimate_is_that_of_least_squares(native: Native, kind_end: tuple[int, ...]) -> None:
-    """p and its covariance against a Gauss-Newton solution of all rows in float64."""
-    random = np.random.default_rng(17)
-    model = BlockModel.random(random, kind_end, 4)
-    config = config_of(model, start_sd=np.full(4, 1e4, np.float32), correlation=1.5)  # nearly no prior
-    truth, groups = rows_of(model, random, 100)
-    core = EstimatorInC(native, model, config, RATE)
-    n_all, y_all = [], []
-    for group in groups:
-        for kind, n, y in group:
-            core.add(kind, n, y)
-            row = np.zeros(model.n_theta)
-            row[model.kinds[kind]] = n
-            n_all.append(row)
-            y_all.append(np.float32(y))
-        core.update()
-        core.iterate()
-    n_rows, y_rows = np.array(n_all), np.array(y_all, np.float64)
-    p = truth.astype(np.float64)
-    for _ in range(20):
-        c = n_rows @ model.dense(p)
-        p = p + np.linalg.lstsq(c, y_rows - n_rows @ model.theta(p), rcond=None)[0]
-    rss = float(np.sum((y_rows - n_rows @ model.theta(p)) ** 2))
-    covariance = np.linalg.inv(c.T @ c) * (1.5 * rss / (len(y_rows) - 4))
-    se = np.sqrt(np.diag(covariance))
-    assert np.all(np.abs(core.p - p) < 0.02 * se)  # float32 sums of 400 to 600 rows
-    estimate = core.assess()
-    assert np.allclose(estimate["se"][:4], se, rtol=1e-3)
-    assert np.allclose(estimate["covariance"][:4, :4], covariance, rtol=1e-3, atol=1e-3 * se.min() ** 2)
 
 
 def test_adding_to_b_moves_the_solution_by_the_inverse_of_the_information(native: Native) -> None:

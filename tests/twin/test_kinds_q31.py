@@ -1,125 +1,16 @@
-"""Rows of several kinds in fixed point: C against twin in every integer, both against float64."""
+"""Rows of several kinds in fixed point: limits of the sums, and more theta than the library has room for."""
 
 import subprocess
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from block_models import BlockModelQ31, EstimatorQ31InC, Int
-from printed_estimator import PrintedEstimator, block_model, printed_core
+from block_models import BlockModelQ31
+from test_kinds import N_BITS, ONE, P_BITS, Y_BITS, Pair, config_of, rows_of
 
 from pvid.core.native import Native
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, sources_of
 from pvid.settings.enums import Reason
-from pvid.settings.q31 import EstimatorConfigQ31
-
-P_BITS, N_BITS, Y_BITS = 27, 20, 18
-ROW_SD = 0.02
-ONE = 2**30
-KINDS = {"two": (4, 9), "three": (3, 5, 10), "uneven": (1, 9)}
-CONFIGS = {
-    "plain": {},
-    "forgetting": {"forgetting_groups": 40},
-    "rate": {"gain": ONE // 5, "forgetting_groups": 100},
-    "pseudovelocity": {"gain": 0},
-    "divider": {"divider": 3, "row_weight": 49152, "correlation": 2 << 16},
-    "dead zone": {"dead_zone": 1 << 15},
-}
-
-Group = list[tuple[int, Int, int]]
-
-
-def config_of(model: BlockModelQ31, **fields: object) -> EstimatorConfigQ31:
-    n_p, n_theta = model.real.n_p, model.real.n_theta
-    unit = 2**P_BITS
-    start = EstimatorConfigQ31(
-        start=(3 * unit // 2,) * n_p,
-        start_sd=(unit,) * n_p,
-        lower=(unit // 10,) * n_p,
-        upper=(10 * unit,) * n_p,
-        p_bits=(P_BITS,) * n_p,
-        n_bits=(N_BITS,) * n_theta,
-        y_bits=Y_BITS,
-        row_sd=round(ROW_SD * 2 ** (Y_BITS + 8)),
-        noise_margin=0,
-    )
-    return replace(start, **fields)  # type: ignore[arg-type]
-
-
-def rows_of(
-    model: BlockModelQ31, random: np.random.Generator, groups: int, size: float = 1.0
-) -> tuple[Int, list[Group]]:
-    """The true p, and groups of rows (kind, N, Y) as integers: two of each kind; N of this size."""
-    p = random.uniform(0.8, 2.5, model.real.n_p)
-    theta = model.real.theta(p)
-    made = []
-    for _ in range(groups):
-        group = []
-        for kind, own in enumerate(model.real.kinds):
-            for _ in range(2):
-                n = np.round(size * random.standard_normal(own.stop - own.start) * 2**N_BITS)
-                y = float(n / 2**N_BITS @ theta[own]) + ROW_SD * random.standard_normal()
-                group.append((kind, n.astype(np.int64), round(y * 2**Y_BITS)))
-        made.append(group)
-    return np.round(p * 2**P_BITS).astype(np.int64), made
-
-
-class Pair:
-    """The estimator in C and its twin; sizes: of the core that is not the default one."""
-
-    def __init__(
-        self, native: Native, model: BlockModelQ31, config: EstimatorConfigQ31, sizes: Mapping[str, int] | None = None
-    ) -> None:
-        self.core = EstimatorQ31InC(native, model, config)
-        module = printed_core("q31", sizes)
-        self.twin = PrintedEstimator(native, module, block_model(module, model), config)
-
-    def add(self, kind: int, n: Int, y: int) -> Reason:
-        reason = self.twin.add(kind, n, y)
-        assert self.core.add(kind, n, y) == reason
-        return Reason(reason)
-
-    def add_to_b(self, m: Int, e: Int) -> Reason:
-        reason = self.twin.add_to_b(m, e)
-        assert self.core.add_to_b(m, e) == reason
-        return Reason(reason)
-
-    def solve(self, ends_group: bool) -> None:
-        own, other = ((one.update if ends_group else one.iterate)() for one in (self.core, self.twin))
-        assert own == other
-
-    def assert_equal(self) -> None:
-        assert np.array_equal(self.core.p, self.twin.p)
-        assert np.array_equal(self.core.sums, self.twin.sums)
-        assert self.core.state.information.exponent == self.twin.state.information.exponent
-
-
-@pytest.mark.by_day(6)
-@pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS.keys())
-@pytest.mark.parametrize("kind_end", KINDS.values(), ids=KINDS.keys())
-def test_core_and_twin_have_the_same_integers(
-    native: Native, kind_end: tuple[int, ...], fields: dict[str, object]
-) -> None:
-    random = np.random.default_rng(sum(kind_end))
-    model = BlockModelQ31.random(random, kind_end, 4)
-    pair = Pair(native, model, config_of(model, **fields))
-    truth, groups = rows_of(model, random, 130)
-    for number, group in enumerate(groups):
-        for kind, n, y in group:
-            assert pair.add(kind, n, y) is Reason.ACCUMULATED
-        if number % 10 == 3:
-            theta = model.real.n_theta
-            pair.add_to_b(random.integers(-ONE, ONE, theta), random.integers(-8, 0, theta))
-        pair.solve(ends_group=True)
-        if number % 4 == 1:
-            pair.solve(ends_group=False)
-        pair.assert_equal()
-    assert pair.core.assess().tobytes() == pair.twin.assess().tobytes()
-    assert pair.core.counters == pair.twin.counters
-    assert pair.core.counters["in_dead_zone"] > 0 or "dead_zone" not in fields
-    # rough: the laws without iteration, and what was added to b, leave more than the rows' noise
-    assert np.allclose(pair.core.p, truth, rtol=0.05)
 
 
 @pytest.mark.parametrize("loud", range(3))
@@ -142,54 +33,6 @@ def test_every_block_keeps_within_its_limit(native: Native, loud: int) -> None:
             pair.assert_equal()
     assert max(exponents) == 1
     assert exponents[0] == exponents[-1] == 0
-
-
-def test_blocks_equal_full_rows_with_zeros(native: Native) -> None:
-    random = np.random.default_rng(8)
-    model = BlockModelQ31.random(random, (4, 10), 4)
-    whole = BlockModelQ31(model.real.whole())
-    config = config_of(model, forgetting_groups=50)
-    blocks, full = EstimatorQ31InC(native, model, config), EstimatorQ31InC(native, whole, config)
-    _, groups = rows_of(model, random, 80)
-    for group in groups:
-        for kind, n, y in group:
-            row = np.zeros(model.real.n_theta, np.int64)
-            row[model.real.kinds[kind]] = n
-            assert blocks.add(kind, n, y) == full.add(0, row, y) == Reason.ACCUMULATED
-        assert blocks.update() == full.update()
-        assert blocks.iterate() == full.iterate()
-        assert np.array_equal(blocks.p, full.p)
-    assert blocks.assess().tobytes() == full.assess().tobytes()
-    assert len(blocks.sums) == 10 + 21 + 10 + 2
-
-
-@pytest.mark.parametrize("kind_end", KINDS.values(), ids=KINDS.keys())
-def test_the_estimate_is_that_of_least_squares(native: Native, kind_end: tuple[int, ...]) -> None:
-    random = np.random.default_rng(17)
-    model = BlockModelQ31.random(random, kind_end, 4)
-    config = config_of(model, start_sd=(2**31 - 1,) * 4)  # nearly no prior
-    truth, groups = rows_of(model, random, 100)
-    core = EstimatorQ31InC(native, model, config)
-    n_all, y_all = [], []
-    for group in groups:
-        for kind, n, y in group:
-            core.add(kind, n, y)
-            row = np.zeros(model.real.n_theta)
-            row[model.real.kinds[kind]] = n / 2**N_BITS
-            n_all.append(row)
-            y_all.append(y / 2**Y_BITS)
-        core.update()
-        core.iterate()
-    n_rows, y_rows = np.array(n_all), np.array(y_all)
-    p = truth / 2**P_BITS
-    for _ in range(20):
-        c = n_rows @ model.real.dense(p)
-        p = p + np.linalg.lstsq(c, y_rows - n_rows @ model.real.theta(p), rcond=None)[0]
-    rss = float(np.sum((y_rows - n_rows @ model.real.theta(p)) ** 2))
-    se = np.sqrt(np.diag(np.linalg.inv(c.T @ c)) * (rss / (len(y_rows) - 4)))
-    # 2^-18 of Y is 2e-4 of a row's noise; the prior of 16 units weighs 1e-6 of the data
-    assert np.all(np.abs(core.p / 2**P_BITS - p) < 0.01 * se)
-    assert np.allclose(core.assess()["se"][:4] / 2**P_BITS, se, rtol=1e-3)
 
 
 def test_what_cannot_be_added_changes_nothing(native: Native) -> None:
@@ -258,7 +101,7 @@ def test_more_theta_than_eleven_have_guard_bits(roomy: Native, kind_end: tuple[i
     for field in ("p", "se"):
         assert np.array_equal(core[field][:2], twin[field][:2])
     # twice as far as its standard error is 1 in 20, and there are ten numbers
-    assert np.all(np.abs(pair.core.p - truth) < 4 * core["se"][:2])
+    assert np.all(np.abs(pair.core.p - truth * 2**P_BITS) < 4 * core["se"][:2])
 
 
 def test_equal_columns_of_equal_rows_do_not_overflow(roomy: Native) -> None:

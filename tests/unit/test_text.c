@@ -1,7 +1,6 @@
 /* pvid/text.h: every number has a text, and a number that is none has one too. */
 #include "test.h"
 
-#include "pvid/former.h"
 #include "pvid/text.h"
 
 static void test_a_reason_is_its_name_in_words(void **state)
@@ -35,23 +34,10 @@ static void test_every_status_has_a_text_of_its_own(void **state)
     }
 }
 
-static void test_the_names_of_version_0_1_mean_the_same(void **state)
-{
-    const pvid_counters counters = {.held_singular = 3, .in_dead_zone = 5};
-    assert_int_equal(PVID_BAD_ANGLE_LIMIT, PVID_BAD_RANGE);
-    assert_int_equal(PVID_HELD_PIVOT, 4);
-    assert_int_equal(counters.held_pivot, 3);
-    assert_int_equal(counters.at_rest, 5);
-    assert_string_equal(pvid_reason_text(PVID_HELD_PIVOT), "held singular");
-    assert_string_equal(pvid_status_text(PVID_BAD_ANGLE_LIMIT),
-                        "bad range: range of a signal: not finite or not positive");
-}
-
 static const struct CMUnitTest tests[] = {
     cmocka_unit_test(test_a_reason_is_its_name_in_words),
     cmocka_unit_test(test_a_status_tells_what_the_field_must_be),
     cmocka_unit_test(test_a_number_that_is_none_has_a_text_too),
     cmocka_unit_test(test_every_status_has_a_text_of_its_own),
-    cmocka_unit_test(test_the_names_of_version_0_1_mean_the_same),
 };
 RUN(tests)
