@@ -8,12 +8,12 @@ import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from logs import log_of
 from lying_board import LyingBoard
 
 import pvid
 from pvid.base.errors import PvidError
 from pvid.cli.main import GROUPS, commands
-from pvid.log.file import LogWriter
 from pvid.models.mechanisms import compiled_of, described
 from pvid.models.registry import asked_for
 from pvid.rig.mechanism_file import MechanismRig
@@ -92,10 +92,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.Fixt
     (tmp_path / "foreign.toml").write_text(RIG)
     (tmp_path / "plain.csv").write_bytes((tmp_path / "foreign.csv").read_bytes())
     (tmp_path / "notes.py").write_text(MODEL)
-    board, writer = LyingBoard(), LogWriter(tmp_path / "foreign.pvlog", rig=f"{RIG}[engine]\nrate = 1\n")
-    writer.begin("a port", None)
-    writer.take(board.honest())
-    writer.close()
+    log_of(tmp_path / "foreign.pvlog", LyingBoard().honest(), rig=f"{RIG}[engine]\nrate = 1\n", why=None)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     monkeypatch.chdir(tmp_path if request.param == "beside" else elsewhere)

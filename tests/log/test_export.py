@@ -14,6 +14,7 @@ import numpy.typing as npt
 import pandas
 import pyarrow.parquet
 import pytest
+from logs import log_of
 from mcap.reader import make_reader
 from pendulum_run import read_run
 from program import pvid
@@ -21,7 +22,6 @@ from program import pvid
 from pvid.base.errors import PvidError
 from pvid.link import frames as link
 from pvid.log.export import FORMATS, export_log
-from pvid.log.file import LogWriter
 from pvid.log.live_stream import live_stream
 from pvid.log.mechanism import UNNAMED
 from pvid.log.reader import LogReader, LogStream
@@ -43,13 +43,7 @@ def log(tmp_path_factory: pytest.TempPathFactory, sent: list[tuple[int, link.Mes
     """A log of two segments; the second lacks a frame of samples, and the board has begun anew."""
     path = tmp_path_factory.mktemp("log") / "field.pvlog"
     frames = list(field_board.frames(sent))
-    writer = LogWriter(path, rig=field_board.text())
-    for data in (b"".join(frames), b"".join([*frames[:60], *frames[61:100]])):
-        writer.begin("a port", None)
-        writer.take(data)
-        writer.end("the end")
-    writer.close()
-    return path
+    return log_of(path, b"".join(frames), b"".join([*frames[:60], *frames[61:100]]), rig=field_board.text())
 
 
 def expected_samples() -> npt.NDArray[np.float64]:
@@ -217,10 +211,7 @@ def test_a_log_is_a_run(tmp_path: Path, log: Path) -> None:
     run = recording_of_log(log, ["phi", "y"])
     assert (len(run), run.sample_rate) == (TICKS, 1000)
     assert np.array_equal(np.stack([run.signals["phi"], run.signals["y"]], axis=1), expected_samples())
-    writer = LogWriter(tmp_path / "empty.pvlog")
-    writer.begin("a port", None)
-    writer.end("the end")
-    writer.close()
+    log_of(tmp_path / "empty.pvlog", b"")
     with pytest.raises(PvidError, match="contains no description of the board"):
         recording_of_log(tmp_path / "empty.pvlog", ["phi", "y"])
 

@@ -11,12 +11,12 @@ from xml.etree import ElementTree
 import field_board
 import pytest
 from click.testing import CliRunner
+from logs import log_of
 from mcap.reader import make_reader
 
 from pvid.cli.main import commands
 from pvid.core.native import Native
 from pvid.log.export import export_log
-from pvid.log.file import LogWriter
 from pvid.log.layout import LAYOUTS
 from pvid.log.live_stream import live_stream
 from pvid.log.mechanism import UNNAMED, LogMechanism, mechanism_named
@@ -36,12 +36,7 @@ def frames(native: Native) -> list[bytes]:
 @pytest.fixture(scope="module")
 def log(frames: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "field.pvlog"
-    writer = LogWriter(path, rig=field_board.text())
-    writer.begin("a port", None)
-    writer.take(b"".join(frames))
-    writer.end("the end")
-    writer.close()
-    return path
+    return log_of(path, b"".join(frames), rig=field_board.text())
 
 
 def fields_of_mcap(path: Path) -> set[tuple[str, str]]:

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 from lies import BEHAVIOURS
+from logs import log_of
 from lying_board import LyingBoard, board, mechanism
 from rehearsal import rehearse
 from rich.console import Console
 
 from pvid.link import frames as link
-from pvid.log.file import LOG_SCHEMA, LogWriter
+from pvid.log.file import LOG_SCHEMA
 from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogReader, Observer
 from pvid.log.status import StatusLine
@@ -75,11 +76,7 @@ def test_no_mutant_of_a_frame_breaks_what_reads_it(tmp_path: Path) -> None:
             honest, other = (chance.choice(chance.choice(kinds)) for _ in range(2))
             sent += [link.encode(honest.message, honest.sequence, honest.tick), mutated(other, chance)]
         log = tmp_path / f"{number}.pvlog"
-        writer = LogWriter(log, rig=board().text())
-        writer.begin("a port", None)
-        writer.take(b"".join(sent))
-        writer.end("the end")
-        writer.close()
+        log_of(log, b"".join(sent), rig=board().text())
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             assert list(faults_of(log)) == []

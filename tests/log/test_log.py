@@ -24,6 +24,7 @@ import numpy.typing as npt
 import pytest
 import serial
 from click.testing import CliRunner
+from logs import log_of
 from shaky import field_log, throughput
 
 from pvid.base import file_lock
@@ -51,14 +52,8 @@ def sent() -> list[bytes]:
 
 def written(path: Path, *segments: list[bytes], cut: int = 0) -> Path:
     """A log of these segments, `cut` bytes short of the last one's end."""
-    writer = LogWriter(path)
-    for frames in segments:
-        writer.begin("a port", None)
-        data = b"".join(frames)
-        writer.take(data[: len(data) - cut] if frames is segments[-1] else data)
-        writer.end("the end")
-    writer.close()
-    return path
+    *before, last = (b"".join(frames) for frames in segments)
+    return log_of(path, *before, last[: len(last) - cut])
 
 
 def read(path: Path) -> tuple[list[Record], Account]:
@@ -206,11 +201,7 @@ def test_segments_follow_each_other_in_one_file(tmp_path: Path, sent: list[bytes
         LogWriter(path)
     with path.open("ab") as file:
         file.write(sent[3][:20])  # as if the logger had been killed
-    writer = LogWriter(path, append=True)
-    writer.begin("another port", {"vid": 1})
-    writer.take(b"".join(sent))
-    writer.end("again")
-    writer.close()
+    log_of(path, b"".join(sent), port="another port", why="again")
     records, account = read(path)
     assert [(one.port, one.why) for one in account.segments] == [
         ("a port", "the end"),
@@ -247,10 +238,7 @@ def test_marks_stand_between_frames_and_count(
 
 def test_the_rig_file_is_in_the_log(tmp_path: Path, sent: list[bytes]) -> None:
     text = "# " + "x" * 2500 + "\nl1 = 0.3\n"
-    writer = LogWriter(tmp_path / "a.pvlog", rig=text)
-    writer.begin("a port", None)
-    writer.take(sent[0])
-    writer.close()
+    log_of(tmp_path / "a.pvlog", sent[0], rig=text, why=None)
     reader = LogReader(tmp_path / "a.pvlog")
     list(reader)
     assert reader.rig == text
@@ -595,10 +583,7 @@ def test_a_log_that_cannot_be_written_ends_with_its_error(tmp_path: Path, monkey
 
 def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -> None:
     rig = field_board.text()
-    writer = LogWriter(tmp_path / "a.pvlog", rig=rig)
-    writer.begin("a port", None)
-    writer.take(sent[0])
-    writer.close()
+    log_of(tmp_path / "a.pvlog", sent[0], rig=rig, why=None)
     refuse_to_append(tmp_path / "a.pvlog", rig)
     refuse_to_append(tmp_path / "a.pvlog", None)
     refuse_to_append(tmp_path / "none.pvlog", rig)

@@ -9,13 +9,13 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from logs import log_of
 from rich.console import Console
 
 from pvid.cli.main import commands
 from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.link.names import Quantity
-from pvid.log.file import LogWriter
 from pvid.log.history import History
 from pvid.log.mechanism import LogMechanism, mechanism_described
 from pvid.log.reader import LogStream, Record
@@ -124,10 +124,7 @@ def records(native: Native, stream: LogStream, tmp_path_factory: pytest.TempPath
     sent = field_board.messages(field_board.Field(4000))
     named = [(tick, names if isinstance(message, link.Names) else message) for tick, message in sent]
     path = tmp_path_factory.mktemp("log") / "a.pvlog"
-    writer = LogWriter(path)
-    writer.begin("a port", None)
-    writer.take(b"".join(field_board.frames(named)))
-    writer.close()
+    log_of(path, b"".join(field_board.frames(named)), why=None)
     return list(stream.feed(path.read_bytes()))
 
 

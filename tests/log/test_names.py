@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lies import NAMED
+from logs import log_of
 from lying_board import PER_FRAME, LyingBoard, message
 
 from pvid.base.errors import PvidError
 from pvid.link import frames as link
 from pvid.link.names import BoardNames, Quantity
 from pvid.log.export import export_log
-from pvid.log.file import LogWriter
 from pvid.log.history import History
 from pvid.log.mechanism import TAKEN, UNNAMED, mechanism_named
 from pvid.log.reader import LogReader, Record
@@ -30,15 +30,6 @@ def of_motor(board: LyingBoard, first: int = 0, ticks: int = PER_FRAME) -> bytes
     covariance = link.upper_triangle(np.diag([0.01, 0.04, 0.16]))
     estimate = board.estimate(p=(1.0, 2.0, 3.0, *[0.0] * 5), covariance=covariance)
     return board.say(samples, first) + board.say(estimate, first + ticks)
-
-
-def log_of(path: Path, *sent: bytes) -> Path:
-    writer = LogWriter(path)
-    writer.begin("a port", None)
-    writer.take(b"".join(sent))
-    writer.end("the end")
-    writer.close()
-    return path
 
 
 def test_names_survive_the_way() -> None:
@@ -63,7 +54,7 @@ def test_samples_in_another_order_are_those_of_the_mechanism(tmp_path: Path) -> 
     board = LyingBoard()
     text = b"kapitza\nsample y m\nsample phi rad\np w 1/s^2\np d1\np d2\np c rad"
     names = board.say(message(link.Names, text=text))
-    log = log_of(tmp_path / "a.pvlog", board.say(board.hello()), names, board.say(board.samples(phi=0.1, y=0.2)))
+    log = log_of(tmp_path / "a.pvlog", board.say(board.hello()) + names + board.say(board.samples(phi=0.1, y=0.2)))
     samples = list(csv.DictReader(export_log(log, "csv", tmp_path / "a", mechanism_of_log(log))[0].open()))
     assert [float(samples[3][name]) for name in ("phi", "y")] == pytest.approx([0.1, 0.2])
 
@@ -79,7 +70,9 @@ def test_log_of_another_mechanism_is_exported_under_its_names(tmp_path: Path) ->
     board = LyingBoard()
     hello = board.hello(form=2, n_p=3, samples=3, phi_lsb=0.0, y_lsb=0.0)
     names = board.say(message(link.Names, text=MOTOR))
-    log = log_of(tmp_path / "a.pvlog", board.say(hello), names, of_motor(board), board.say(board.samples(), PER_FRAME))
+    log = log_of(
+        tmp_path / "a.pvlog", board.say(hello) + names + of_motor(board) + board.say(board.samples(), PER_FRAME)
+    )
     mechanism = mechanism_of_log(log)
     assert mechanism.name == "motor"
     paths = export_log(log, "csv", tmp_path / "a", mechanism)
@@ -115,7 +108,7 @@ def test_view_follows_the_names_and_forgets_what_went_before() -> None:
 
 def test_values_with_a_rig_do_not_follow_the_board(tmp_path: Path) -> None:
     board = LyingBoard()
-    log = log_of(tmp_path / "a.pvlog", board.say(board.hello()), board.say(message(link.Names, text=MOTOR)))
+    log = log_of(tmp_path / "a.pvlog", board.say(board.hello()) + board.say(message(link.Names, text=MOTOR)))
     values = Values()
     assert [list(values.rows(record)) for record in LogReader(log)] and values.mechanism is UNNAMED
 

@@ -25,6 +25,7 @@ import serial
 import uvicorn
 from click.testing import CliRunner
 from lies import Behaviour
+from logs import log_of
 from lying_board import TICKS, Flood, LyingBoard, Pause, Step, message
 from rehearsal import RehearsedSource
 
@@ -44,17 +45,6 @@ from pvid.log.tail import LogTail
 from pvid.log.values import Values
 from pvid.show import patience
 from pvid.show.page import page
-
-
-def log_of(path: Path, *segments: bytes, rig: str | None = None) -> Path:
-    """A log in which the board sent these bytes."""
-    writer = LogWriter(path, rig=rig, append=path.exists())
-    for data in segments:
-        writer.begin("a port", None)
-        writer.take(data)
-        writer.end("the end")
-    writer.close()
-    return path
 
 
 def account_of(path: Path) -> Account:

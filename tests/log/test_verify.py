@@ -11,6 +11,7 @@ from typing import Any
 import field_board
 import numpy as np
 import pytest
+from logs import log_of
 from program import pvid
 
 from pvid.base.errors import PvidError
@@ -48,12 +49,7 @@ def sent() -> Sent:
 def verified(path: Path, *segments: Sequence[bytes], board: ReplayableBoard | None = None) -> list[Stretch]:
     """The stretches of a log of these segments."""
     board = board or field_board.board()
-    writer = LogWriter(path, rig=field_board.text())
-    for frames in segments:
-        writer.begin("a port", None)
-        writer.take(b"".join(frames))
-        writer.end("the end")
-    writer.close()
+    log_of(path, *(b"".join(frames) for frames in segments), rig=field_board.text())
     return list(Verifier(board).stretches(LogReader(path)))
 
 

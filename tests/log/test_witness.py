@@ -10,12 +10,12 @@ from typing import Any
 import field_board
 import numpy as np
 import pytest
+from logs import log_of
 
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.link import frames as link
-from pvid.log.file import LogWriter
 from pvid.log.reader import LogReader
 from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.twin.printed import PrintedTwin
@@ -75,11 +75,7 @@ class _Core:
 
 def verified(path: Path, sent: Sent, board: Any = None, **options: Any) -> Stretch:
     """The only stretch of the log."""
-    writer = LogWriter(path / "a.pvlog", rig=field_board.text())
-    writer.begin("a port", None)
-    writer.take(b"".join(field_board.frames(sent)))
-    writer.end("the end")
-    writer.close()
+    log_of(path / "a.pvlog", b"".join(field_board.frames(sent)), rig=field_board.text())
     (stretch,) = Verifier(board or field_board.board(), **options).stretches(LogReader(path / "a.pvlog"))
     return stretch
 

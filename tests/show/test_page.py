@@ -19,6 +19,7 @@ import pytest
 from browser import chromium
 from click.testing import CliRunner
 from conftest import ROOT
+from logs import log_of
 from selenium import webdriver
 
 from pvid.base.errors import PvidError
@@ -153,10 +154,7 @@ def test_log_refuses_an_address_before_it_records(tmp_path: Path) -> None:
 
 
 def test_the_state_is_that_of_the_log_and_bounded(sent: list[bytes], tmp_path: Path) -> None:
-    writer = LogWriter(tmp_path / "a.pvlog", rig=field_board.text())
-    writer.begin("a port", None)
-    writer.take(b"".join(sent))
-    writer.close()
+    log_of(tmp_path / "a.pvlog", b"".join(sent), rig=field_board.text(), why=None)
     log = (tmp_path / "a.pvlog").read_bytes()
     state = state_of(log, "a title")
     assert state["title"] == "a title" and state["up"] and state["lost"] == ""
@@ -178,10 +176,7 @@ def test_the_state_is_that_of_the_log_and_bounded(sent: list[bytes], tmp_path: P
 
 
 def test_every_beginning_of_a_log_has_a_state(sent: list[bytes], tmp_path: Path) -> None:
-    writer = LogWriter(tmp_path / "a.pvlog")  # no rig file: the linear parameters
-    writer.begin("a port", None)
-    writer.take(b"".join(sent[:200]))
-    writer.close()
+    log_of(tmp_path / "a.pvlog", b"".join(sent[:200]), why=None)
     log = (tmp_path / "a.pvlog").read_bytes()
     state = LiveState(Path("nowhere"), "")
     for at in range(0, len(log), 101):
@@ -287,11 +282,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
 def finished(sent: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log whose recording has ended."""
     path = tmp_path_factory.mktemp("finished") / "a.pvlog"
-    writer = LogWriter(path, rig=field_board.text())
-    writer.begin("a port", None)
-    writer.take(b"".join(sent))
-    writer.close()
-    return path
+    return log_of(path, b"".join(sent), rig=field_board.text(), why=None)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from pathlib import Path
 import field_board
 import pytest
 from browser import chromium
+from logs import log_of
 from rich.console import Console
 from selenium import webdriver
 
@@ -35,12 +36,9 @@ def sent() -> list[tuple[int, link.Message]]:
 def log(sent: list[tuple[int, link.Message]], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of that run, its rig file in it."""
     path = tmp_path_factory.mktemp("pictures") / "run.pvlog"
-    writer = LogWriter(path, rig=field_board.text())
-    writer.begin("/dev/ttyACM0", None)
-    writer.take(b"".join(field_board.frames(sent)))
-    writer.end("ended by SIGINT")
-    writer.close()
-    return path
+    return log_of(
+        path, b"".join(field_board.frames(sent)), rig=field_board.text(), port="/dev/ttyACM0", why="ended by SIGINT"
+    )
 
 
 @pytest.fixture
