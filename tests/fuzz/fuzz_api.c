@@ -336,7 +336,6 @@ static void spoil_refinement(pvid_refine_config_f32 *config)
     float *const fields[] = {&config->sample_rate_hz,
                              &config->sd[0],
                              &config->prior_sd[below(PVID_REFINE_PARAMETERS)],
-                             &config->gain_sd[below(PVID_REFINE_PARAMETERS)],
                              &config->state_limit[below(PVID_REFINE_STATES)],
                              &config->forgetting_s,
                              &config->outlier_gate,

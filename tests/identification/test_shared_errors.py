@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.configuration.refine import refine_design
 from pvid.configuration.shared import Shared
 from pvid.configuration.weak import (
     config_for_recording,
@@ -114,6 +116,32 @@ def test_a_board_publishes_them_and_compares_without_them(name: str) -> None:
     sd = whole.trust.shared[places] * np.where(positive, one.published[there][:, :n_p], 1.0)
     expected = np.hypot(one.published_se[there][:, :n_p], sd)
     np.testing.assert_allclose(other.published_se[there][:, :n_p], expected, rtol=2e-6)
+
+
+@pytest.mark.parametrize("name", ["dc_motor", "battery_2rc"])
+def test_the_second_stage_adds_them_behind_its_verdict(name: str) -> None:
+    """Its estimates have the same bits, its covariance that of the table; p of the second has another order in r."""
+    compiled, simulation = compiled_of(name), RigSimulation.of(compiled_of(name), simulated_rig(name), whole=True)
+    whole, run = config_for_rig_like_the_shipped(compiled), simulation.run()
+    settings, made = refine_design(compiled, whole, run, simulation.truth), refine_functions(compiled)
+    bare = replace(whole, trust=replace(whole.trust, shared=None))
+    native = weak_native(compiled, whole.design, made)
+    both = [native.refined_of(config, settings) for config in (bare, whole)]
+    one, other = (identifier.run_both(samples_of(whole, run)) for identifier in both)
+    assert np.array_equal(one.r, other.r) and np.array_equal(one.told, other.told) and np.any(one.r[-1] != 0)
+    assert whole.trust.shared is not None
+    n, positive = len(compiled.p_names), [unknown.positive for unknown in compiled.unknowns]
+    table = np.zeros((n, n))
+    table[np.triu_indices(n)] = whole.trust.shared
+    sd, correlation = np.diag(table), np.triu(table, 1) + np.triu(table, 1).T + np.eye(n)
+    places = np.ix_(made.places_of_p, made.places_of_p)
+    without, with_table = (identifier.refined for identifier in both)
+    assert without is not None and with_table is not None
+    added = np.asarray(with_table["covariance"] - without["covariance"], np.float64)[places]
+    np.testing.assert_allclose(added, correlation * np.outer(sd, sd), atol=1e-6 * np.max(sd) ** 2)
+    unit = np.where(positive, one.r[-1][made.places_of_p], 1.0)
+    expected = np.hypot(one.se[-1][made.places_of_p], sd * unit)
+    np.testing.assert_allclose(other.se[-1][made.places_of_p], expected, rtol=1e-5)
 
 
 def test_fixed_point_publishes_the_same() -> None:

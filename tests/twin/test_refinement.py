@@ -46,7 +46,7 @@ class Twin:
         self.module, self.state, self.running = module(), module().pvid_refine_f32(), [fnv.START]
         self.parameters = len(config.prior_sd)
         settings = filled(self.module, "pvid_refine_config_f32", config)
-        assert self.module.pvid_refine_init_f32(self.state, settings, 2) == 0
+        assert self.module.pvid_refine_init_f32(self.state, settings, 2, None) == 0
 
     def run(self, given: Float, p: Float, se: Float) -> RefineRecord:
         ticks, flat = len(given), np.zeros((2, len(given) * self.parameters), np.float32)

@@ -278,7 +278,7 @@ static pvid_refine_f32 refinement;
 static void refuses(const pvid_refine_config_f32 *config, pvid_status status)
 {
     const float sample[2] = {0.0f, 0.0f};
-    assert_int_equal(pvid_refine_init_f32(&refinement, config, 2), status);
+    assert_int_equal(pvid_refine_init_f32(&refinement, config, 2, NULL), status);
     assert_int_equal(pvid_refine_step_f32(&refinement, sample, NULL, false), PVID_NOT_READY);
     assert_null(pvid_refine_latest_f32(&refinement));
 }
@@ -333,7 +333,6 @@ static void test_init_refuses(void **state)
     REFUSES(jobs, 129, PVID_BAD_ITERATIONS);
     REFUSES(sd[0], 0.0f, PVID_BAD_ROW_SD);
     REFUSES(prior_sd[6], nan, PVID_BAD_START_SD);
-    REFUSES(gain_sd[0], nan, PVID_BAD_START_SD);
     REFUSES(state_limit[3], 0.0f, PVID_BAD_BOUNDS);
     REFUSES(forgetting_s, -1.0f, PVID_BAD_FORGETTING);
     REFUSES(outlier_gate, nan, PVID_BAD_GATE_SIGMAS);
@@ -348,9 +347,9 @@ static void test_init_refuses(void **state)
     REFUSES(distance, -1.0f, PVID_BAD_START_SD);
     refuses(NULL, PVID_BAD_POINTER);
     const pvid_refine_config_f32 config = good();
-    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 1), PVID_BAD_DESIGN); /* it needs two */
-    assert_int_equal(pvid_refine_init_f32(NULL, &config, 2), PVID_BAD_POINTER);
-    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2), PVID_OK);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 1, NULL), PVID_BAD_DESIGN); /* it needs two */
+    assert_int_equal(pvid_refine_init_f32(NULL, &config, 2, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2, NULL), PVID_OK);
 }
 
 static void test_before_its_init_it_does_nothing(void **state)
@@ -373,7 +372,7 @@ static void test_before_its_init_it_does_nothing(void **state)
     }
     assert_memory_equal(&none, &zero, sizeof none);
     const pvid_refine_config_f32 config = good();
-    assert_int_equal(pvid_refine_init_f32(&none, &config, 2), PVID_OK);
+    assert_int_equal(pvid_refine_init_f32(&none, &config, 2, NULL), PVID_OK);
     assert_int_equal(pvid_refine_step_f32(&none, NULL, NULL, false), PVID_NOT_READY);
     assert_false(pvid_refine_read_f32(&none, NULL, NULL));
     pvid_refine_gap_f32(&none); /* while it waits */
@@ -401,7 +400,7 @@ static void test_it_waits_for_the_weak_form(void **state)
     const float sample[2] = {0.1f, 0.0f};
     pvid_refine_estimate_f32 estimate;
     uint32_t number = 7;
-    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2), PVID_OK);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2, NULL), PVID_OK);
     for (int i = 0; i < 3000; i++) {
         assert_int_equal(pvid_refine_step_f32(&refinement, sample, NULL, false), PVID_WARMING_UP);
     }
@@ -502,7 +501,7 @@ static bool is_at_its_end(void)
 static void begin_run(void)
 {
     const pvid_refine_config_f32 config = sampled();
-    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2), PVID_OK);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2, NULL), PVID_OK);
 }
 
 static void is_near_the_truth(void)
@@ -956,6 +955,43 @@ static void test_a_droop_is_that_of_the_samples_of_a_mean(void **state)
     }
 }
 
+static float of_p(const pvid_refine_estimate_f32 *estimate, size_t a, size_t b)
+{
+    return estimate->covariance[pvid_refine_place_of_p[a]][pvid_refine_place_of_p[b]];
+}
+
+/* As errors of steps: relative where they are logarithmic. The fourth of p is no logarithm. */
+static void test_shared_errors_are_added_by_p_s_places(void **state)
+{
+    (void)state;
+    const float shared[10] = {0.01f, 1.0f, 0.5f, 0.0f, 0.02f, 0.0f, -1.0f, 0.0f, 0.0f, 0.3f};
+    const float sd[4] = {0.01f, 0.02f, 0.0f, 0.3f};
+    const float own = 1.0e-4f;
+    pvid_refine_estimate_f32 estimate;
+    float r[N];
+    to_floats(truth, r, N);
+    pvid_refine_assess_begin_f32(&estimate);
+    for (size_t i = 0; i < N; i++) {
+        estimate.covariance[i][i] = own;
+    }
+    pvid_refine_assess_end_f32(&estimate, r, 1.0f, 1.0f);
+    const pvid_refine_estimate_f32 before = estimate;
+    pvid_refine_add_shared_f32(&estimate, shared);
+    for (size_t a = 0; a < 4u; a++) {
+        const size_t i = pvid_refine_place_of_p[a];
+        const float unit = pvid_refine_is_logarithmic_f32(i) ? r[i] : 1.0f;
+        assert_float_equal(estimate.se[i], unit * sqrtf(own + (sd[a] * sd[a])), 1.0e-6f * unit);
+    }
+    assert_float_equal(of_p(&estimate, 0, 1), 2.0e-4f, 1.0e-9f);
+    assert_float_equal(of_p(&estimate, 1, 0), 2.0e-4f, 1.0e-9f);
+    assert_float_equal(of_p(&estimate, 1, 3), -6.0e-3f, 1.0e-8f);
+    assert_float_equal(of_p(&estimate, 0, 2), 0.0f, 0.0f); /* no error of its own */
+    for (size_t i = 0; i < N; i++) {                       /* what the weak form does not have */
+        const bool of_both = (i <= 2u) || (i == pvid_refine_place_of_p[3]);
+        assert_true(of_both || (estimate.se[i] == before.se[i]));
+    }
+}
+
 static void test_a_level_below_1_widens_nothing(void **state)
 {
     const float level[] = {0.0f, 0.25f, 1.0f, 1.44f, 4.0f};
@@ -1063,6 +1099,7 @@ int main(void)
         cmocka_unit_test(test_a_busy_weak_form_does_not_starve_it),
         cmocka_unit_test(test_it_rests_at_so_many_ticks_in_a_row),
         cmocka_unit_test(test_a_droop_is_that_of_the_samples_of_a_mean),
+        cmocka_unit_test(test_shared_errors_are_added_by_p_s_places),
         cmocka_unit_test(test_a_level_below_1_widens_nothing),
         cmocka_unit_test(test_every_number_of_a_refinement_counts_in_its_hash),
         cmocka_unit_test(test_the_model_s_fingerprint_is_that_of_its_functions),

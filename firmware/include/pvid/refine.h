@@ -93,7 +93,6 @@ typedef struct pvid_refine_config_f32 {
     float sd[PVID_REFINE_OUTPUTS];          /* of the noise of a row, at low frequencies [unit of the output], > 0 */
     float prior_sd[PVID_REFINE_PARAMETERS]; /* of the weak form's estimate, in the search; relative if logarithmic;
                                                with signs 10 of its standard errors at most */
-    float gain_sd[PVID_REFINE_PARAMETERS];  /* change of each step of r by one s.d. of a sensor's gain, with its sign */
 #if PVID_REFINE_RUNGE_KUTTA
     uint8_t parts;      /* equal parts of a step, each of two jobs, 1..64 */
     uint8_t fine_parts; /* of a step in which a sign may change, parts..64 */
@@ -154,10 +153,12 @@ typedef struct pvid_refine_f32 pvid_refine_f32;
 #define pvid_refiner_f32 PVID_REFINED(pvid_refiner_f32, PVID_REFINE_MODEL_ID)
 extern const pvid_weak_refiner_f32 pvid_refiner_f32;
 
-/* Initialises `self`; `samples`: in the argument of step. Fails iff
+/* Initialises `self`. samples: in the argument of step. shared: errors that all windows share, of trust.h, which are
+ * added to those of published estimates; must outlive `self`; NULL: none. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or
  *   - a field of config is out of its range (the status names it). */
-pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config, size_t samples);
+pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config, size_t samples,
+                                 const float shared[]);
 
 /* One tick.
  *   sample:  the samples of signal[].sample, taken at the same time

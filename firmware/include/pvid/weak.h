@@ -128,7 +128,8 @@ struct pvid_refine_config_f32;
 /* Its functions: pvid_refiner_f32 of refine.h. The weak form calls them through this table alone: without a second
  * stage no code of it is linked. */
 typedef struct {
-    pvid_status (*init)(struct pvid_refine_f32 *self, const struct pvid_refine_config_f32 *config, size_t samples);
+    pvid_status (*init)(struct pvid_refine_f32 *self, const struct pvid_refine_config_f32 *config, size_t samples,
+                        const float shared[]);
     pvid_reason (*step)(struct pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy);
     void (*gap)(struct pvid_refine_f32 *self);
     void (*freeze)(struct pvid_refine_f32 *self, bool frozen);

@@ -92,7 +92,6 @@ uint32_t pvid_fingerprint_refine_f32(uint32_t hash, const pvid_refine_config_f32
     running = pvid_fnv_word(running, config->first_block);
     running = pvid_fingerprint_floats(running, config->sd, PVID_REFINE_OUTPUTS);
     running = pvid_fingerprint_floats(running, config->prior_sd, PVID_REFINE_PARAMETERS);
-    running = pvid_fingerprint_floats(running, config->gain_sd, PVID_REFINE_PARAMETERS);
     running = pvid_fingerprint_floats(running, config->state_limit, PVID_REFINE_STATES);
     return pvid_fingerprint_floats(running, limits, sizeof limits / sizeof limits[0]);
 }

@@ -698,7 +698,7 @@ static float variance_of_row(const pvid_refine_f32 *self)
 static void assess(pvid_refine_f32 *self)
 {
     if (self->pass == 0u) {
-        pvid_refine_assess_begin_f32(&self->work.sums.candidate, &self->config);
+        pvid_refine_assess_begin_f32(&self->work.sums.candidate);
     }
     pvid_refine_assess_column_f32(&self->work.sums.candidate, self->solve.triangle, self->pass, variance_of_row(self));
     self->pass++;
@@ -709,6 +709,9 @@ static void publish(pvid_refine_f32 *self)
 {
     if (self->verdict == PVID_UPDATED) {
         pvid_count_up(&self->published);
+        if ((PVID_SHARED != 0) && (self->shared != NULL)) {
+            pvid_refine_add_shared_f32(&self->work.sums.candidate, self->shared);
+        }
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->work.sums.candidate,
                                sizeof self->work.sums.candidate, self->published);
     }
@@ -816,12 +819,14 @@ PVID_NOINLINE static pvid_reason work(pvid_refine_f32 *self)
 
 /* ---- API ---- */
 
-PVID_COLD pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config, size_t samples)
+PVID_COLD pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config, size_t samples,
+                                           const float shared[])
 {
     pvid_status status = pvid_init_is_given(self, config) ? pvid_refine_valid_f32(config, samples) : PVID_BAD_POINTER;
     if (status == PVID_OK) {
         memset(self, 0, sizeof *self);
         self->config = *config;
+        self->shared = shared;
         self->h = (float)config->ratio / config->sample_rate_hz;
         const float seconds = (float)config->block * ((float)PVID_REFINE_SUB * self->h);
         self->fade = 1.0f;

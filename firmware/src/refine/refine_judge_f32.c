@@ -26,13 +26,9 @@ bool pvid_refine_within_f32(float x, float limit)
     return (x > -limit) && (x < limit);
 }
 
-PVID_COLD void pvid_refine_assess_begin_f32(pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config)
+PVID_COLD void pvid_refine_assess_begin_f32(pvid_refine_estimate_f32 *estimate)
 {
-    for (size_t i = 0; i < N; i++) {
-        for (size_t j = 0; j < N; j++) {
-            estimate->covariance[i][j] = config->gain_sd[i] * config->gain_sd[j];
-        }
-    }
+    memset(estimate->covariance, 0, sizeof estimate->covariance);
 }
 
 PVID_COLD void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const float triangle[], size_t column,
@@ -49,15 +45,40 @@ PVID_COLD void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate,
     }
 }
 
+/* The standard errors of r from the covariance of its steps. */
+PVID_COLD static void set_errors(pvid_refine_estimate_f32 *estimate)
+{
+    for (size_t i = 0; i < N; i++) {
+        const float sd = sqrtf(estimate->covariance[i][i]);
+        estimate->se[i] = pvid_refine_is_logarithmic_f32(i) ? (sd * estimate->r[i]) : sd;
+    }
+}
+
 PVID_COLD void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level, float clash)
 {
     estimate->level = level;
     estimate->clash = clash;
-    for (size_t i = 0; i < N; i++) {
-        const float sd = sqrtf(estimate->covariance[i][i]);
-        estimate->r[i] = r[i];
-        estimate->se[i] = pvid_refine_is_logarithmic_f32(i) ? (sd * r[i]) : sd;
+    memcpy(estimate->r, r, sizeof estimate->r);
+    set_errors(estimate);
+}
+
+PVID_COLD void pvid_refine_add_shared_f32(pvid_refine_estimate_f32 *estimate, const float shared[])
+{
+    size_t of_row = 0; /* its standard deviation, then its correlations with the others */
+    for (size_t a = 0; a < PVID_REFINE_P; a++) {
+        const size_t i = pvid_refine_place_of_p[a];
+        size_t of_column = of_row;
+        for (size_t b = a; b < PVID_REFINE_P; b++) {
+            const size_t j = pvid_refine_place_of_p[b];
+            const float correlation = (a == b) ? 1.0f : shared[of_row + (b - a)];
+            const float common = (shared[of_row] * shared[of_column]) * correlation;
+            estimate->covariance[i][j] += common;
+            estimate->covariance[j][i] = estimate->covariance[i][j];
+            of_column += (size_t)PVID_REFINE_P - b;
+        }
+        of_row += (size_t)PVID_REFINE_P - a;
     }
+    set_errors(estimate);
 }
 
 /* Whether the two estimates of an entry of r agree. */

@@ -57,8 +57,7 @@ static pvid_status sizes_are_valid(const pvid_refine_config_f32 *config)
     if (!all_within(config->sd, PVID_REFINE_OUTPUTS, 1.0e-15f, 1.0e9f)) {
         return PVID_BAD_ROW_SD;
     }
-    if (!all_within(config->prior_sd, PVID_REFINE_PARAMETERS, 1.0e-9f, 1.0e9f) ||
-        !all_within(config->gain_sd, PVID_REFINE_PARAMETERS, -1.0e9f, 1.0e9f)) {
+    if (!all_within(config->prior_sd, PVID_REFINE_PARAMETERS, 1.0e-9f, 1.0e9f)) {
         return PVID_BAD_START_SD;
     }
 #if PVID_REFINE_RUNGE_KUTTA

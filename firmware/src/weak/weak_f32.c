@@ -152,7 +152,8 @@ static pvid_status init_refinement(pvid_weak_f32 *self, const pvid_weak_refine_f
         return PVID_BAD_POINTER;
     }
     self->refine = refine;
-    return refine->refiner->init(refine->storage, refine->config, self->design->model->samples);
+    return refine->refiner->init(refine->storage, refine->config, self->design->model->samples,
+                                 self->trust.config.shared);
 }
 
 /* Returns whether the sums of a window have a place of their own, or are used before the next half's first block. */

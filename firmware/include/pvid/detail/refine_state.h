@@ -151,9 +151,10 @@ typedef struct {
 /* Only the functions of refine.h write to it. */
 struct pvid_refine_f32 {
     pvid_refine_config_f32 config;
-    float h;    /* a step of the motion [s] */
-    float fade; /* forgetting of a full block, on the triangle */
-    float kept; /* part of the triangle behind the last block that was taken, beside forgetting */
+    const float *shared; /* of trust.h; NULL: none */
+    float h;             /* a step of the motion [s] */
+    float fade;          /* forgetting of a full block, on the triangle */
+    float kept;          /* part of the triangle behind the last block that was taken, beside forgetting */
     float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
     bool renewed;                      /* the weak form has given an estimate since the search began from one */
     bool frozen;

@@ -331,6 +331,7 @@ def _refine(settings: Mapping[str, Any]) -> RefineConfig | None:
         RefineSignal(sample, order, scale, range_, SignalSource(source))
         for sample, order, scale, range_, source in given.pop("signal")
     )
+    given.pop("gain_sd", None)  # of former logs, whose first stage's table has the gains now
     arrays: dict[str, Any] = {
         key: array_of(value) if isinstance(value, list | str) else value for key, value in given.items()
     }

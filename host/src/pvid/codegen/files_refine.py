@@ -418,7 +418,7 @@ def design_tables(settings: RefineConfig, name: str) -> list[str]:
         "second": f"{name}_second" if second else "NULL",
         "signal": f"{name}_signal",
         **{one: getattr(settings, one) for one in ("block", "first_block", "passes", "most_passes", "jobs", "rests")},
-        **{one: _row(getattr(settings, one)) for one in ("sd", "prior_sd", "gain_sd", "state_limit")},
+        **{one: _row(getattr(settings, one)) for one in ("sd", "prior_sd", "state_limit")},
         **{
             one: number(getattr(settings, one))
             for one in (

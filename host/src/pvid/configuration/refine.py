@@ -138,7 +138,6 @@ def refine_settings(
         signal=tuple(signal),
         sample_sd=tuple(model.signal(name).sd for name in made.outputs),
         prior_sd=tuple(one.prior_sd for one in made.parameters),
-        gain_sd=(0.0,) * len(made.parameters),
         state_limit=_state_limit(made, run, rate),
     )
     rig = _with_steps(rig, made, _jumps(made, r, states), block_s)

@@ -62,8 +62,9 @@ class RefineNative:
 
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
-        address = self.native.headers.ffi.addressof(self._filled.struct)
-        return Status(self.native.library.pvid_refine_init_f32(self.state, address, self._samples))
+        ffi = self.native.headers.ffi
+        address = ffi.addressof(self._filled.struct)
+        return Status(self.native.library.pvid_refine_init_f32(self.state, address, self._samples, ffi.NULL))
 
     def freeze(self, frozen: bool) -> None:
         """pvid_refine_freeze_f32."""

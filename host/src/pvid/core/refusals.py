@@ -20,7 +20,6 @@ _RANGES: Mapping[Status, tuple[tuple[str, float, float], ...]] = {
     Status.BAD_START_SD: (
         ("start_sd", 1e-30, _LARGE),
         ("prior_sd", 1e-9, 1e9),
-        ("gain_sd", -1e9, 1e9),
         ("distance", 0, 1e9),
     ),
     Status.BAD_BOUNDS: (("width", 1e-9, 1e9), ("state_limit", 1e-9, 1e9)),

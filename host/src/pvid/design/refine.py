@@ -58,7 +58,6 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0, outlier_gate: float
         first_block=max(round(0.26 * block), 8),
         sd=_as_float32(np.asarray(rig.sample_sd) / share),
         prior_sd=_as_float32(rig.prior_sd),
-        gain_sd=_as_float32(rig.gain_sd),
         state_limit=_as_float32(rig.state_limit),
         forgetting_s=forgetting_s,
         outlier_gate=outlier_gate,

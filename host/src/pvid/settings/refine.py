@@ -49,7 +49,6 @@ class RefineConfig:
     block, first_block : big steps of a full block and of the first one of a search
     sd : of the noise of a row at low frequencies [outputs]
     prior_sd : of the weak form's estimate [parameters], relative if logarithmic
-    gain_sd : errors of the steps by one error of a sensor's gain, with their signs [parameters]
     state_limit : largest |start| of a block [states]
     passes, most_passes : of a block: at least (in the track one with a short step), and while the steps are not small
     jobs : of a pass in one tick: 1 without a floating point unit
@@ -73,7 +72,6 @@ class RefineConfig:
     first_block: int
     sd: Float32
     prior_sd: Float32
-    gain_sd: Float32
     state_limit: Float32
     passes: int = 2
     most_passes: int = 8
@@ -105,7 +103,7 @@ class RefineRig:
     slow_hz, fast_hz : frequencies of the motion; with Runge-Kutta the largest rate over 2 pi
     signal : inputs, then outputs of the model
     sample_sd : white noise of a sample of each output [outputs]
-    prior_sd, gain_sd : [parameters]
+    prior_sd : [parameters]
     state_limit : [states]
     rests : ticks in a row, at most, that the refinement leaves to the weak form
     runge_kutta : each step is Runge-Kutta's; else Adams's
@@ -121,7 +119,6 @@ class RefineRig:
     signal: tuple[RefineSignal, ...]
     sample_sd: Sequence[float]
     prior_sd: Sequence[float]
-    gain_sd: Sequence[float]
     state_limit: Sequence[float]
     rests: int = 1
     runge_kutta: bool = False
