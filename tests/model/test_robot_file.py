@@ -63,7 +63,7 @@ def chain_of(folder: Path, text: str, *joints: str) -> Chain:
 )
 def test_a_model_file_has_the_torques_of_mujoco(text: str, joints: tuple[str, ...], tmp_path: Path) -> None:
     chain = chain_of(tmp_path, text, *joints)
-    plain = re.sub("<visual>.*?</visual>", "", text)
+    plain = re.sub("<visual>.*?</visual>|<dynamics[^>]*>", "", text)
     model = mujoco.MjModel.from_xml_string(plain)
     data, states = mujoco.MjData(model), np.random.default_rng(2).uniform(-1, 1, (3, model.nv, 10))
     moved = [k for k in range(model.nv) if not joints or model.joint(k).name in joints]
@@ -86,6 +86,7 @@ def test_the_model_file_is_short(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
     text = model_text(tmp_path / "arm.urdf")
     assert "rpy=(-pi/2, 0, 0)," in text and 'model.joint("shoulder",' in text
+    assert "limits=(-2, 2), speed=3, torque=50," in text and "friction=(0.2, 0.5), speed=4, torque=20," in text
     assert len(text.splitlines()) < 12 and max(map(len, text.splitlines())) <= 200
 
 

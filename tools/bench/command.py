@@ -118,6 +118,18 @@ CASES = (
         ),
     ),
     Case(
+        "robot-motion",
+        "Motions of robots: none beyond random limits, and errors beside those of a multisine of three times the time.",
+        "robot_motion",
+        ("robot-limits", "robot-motion"),
+        (
+            option("--draws", 10_000, "Of limits."),
+            option("--turns", 2, "Iterations of the search within them.", least=0),
+            option("--seeds", 20, "Recordings of each motion."),
+            click.Option(["--joints"], multiple=True, type=click.IntRange(2, 7), default=(3, 6), help="Of the arms."),
+        ),
+    ),
+    Case(
         "fuzz-link",
         "The C side of the serial link under libFuzzer, with sanitizers (needs clang).",
         "fuzz:link_report",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pvid.base.errors import PvidError
-from pvid.cli.input import columns_option, rig_options
+from pvid.cli.input import NewFile, columns_option, force_option, rig_options
 from pvid.log.rig_choice import rig_of
 from pvid.models.registry import names
 from pvid.models.simulated_rig import simulated_rig
@@ -43,7 +43,9 @@ if TYPE_CHECKING:
     metavar="MHZ",
     help="With --on: the ticks as parts of the time between samples at this clock.",
 )
+@click.option("-o", "--out", type=NewFile(), help="Of a robot: the motion to write, a CSV file, with its C beside it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@force_option
 def command(
     model: str | None,
     rig_path: Path | None,
@@ -56,9 +58,13 @@ def command(
     core: Core | None,
     refine: bool,
     clock: float | None,
+    out: Path | None,
     as_json: bool,
 ) -> int:
     """Predicts the standard errors of the weak form for a rig, and shows its design.
+
+    For a robot it designs a motion of --duration within the limits of the model file (host/docs/robots.md), and writes
+    it to --out.
 
     The drive is that of a recorded run, else that of the mechanism's simulated rig, scaled to the guess of the rig
     file. C tables of the design are printed by model build.
@@ -67,7 +73,7 @@ def command(
     longest, and bytes of RAM and flash; with --refine also of both stages. A cost is printed only if the board's hashes
     are those of this computer.
     """
-    from pvid.cli.design_run import print_design
+    from pvid.cli.design_run import print_design, print_motion
     from pvid.cli.identify_run import recording_of  # loads SymPy
     from pvid.configuration.nominal_run import nominal_run
     from pvid.models.mechanisms import compiled_of
@@ -80,9 +86,11 @@ def command(
         raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
     asked = _asked(target, core, refine=refine, clock=clock)
     drive = [_tone(text) for text in tones]
-    if model in names() and not (rig_path or settings or run_path or drive or duration):
+    if model in names() and not (rig_path or settings or run_path or drive or duration or out):
         return print_design(compiled_of(model), None, asked, as_json=as_json)
     rig = rig_of(run_path, rig_path, settings, model, columns)
+    if out is not None or (run_path is None and not drive and asked is None and rig.compiled().chain is not None):
+        return print_motion(rig, duration, out, as_json=as_json)
     if run_path is not None:
         recording, compiled = recording_of(run_path, rig, columns)
         return print_design(compiled, recording, asked, as_json=as_json)

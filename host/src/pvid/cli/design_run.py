@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -12,13 +13,16 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.base.atomic_write import write_whole
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, working, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
+from pvid.base.wording import listed
 from pvid.configuration.design_report import DesignReport, designs_tried, report_for_recording, report_for_rig
 from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.settings.cores import CORES
 from pvid.settings.refine import RefineConfig
@@ -54,6 +58,49 @@ def print_design(
     elif costs:
         _print_costs(costs)
     return DONE if report.chosen.known else NOTHING_IDENTIFIED
+
+
+def print_motion(rig: MechanismRig, duration: float | None, out: Path | None, *, as_json: bool) -> int:
+    """Designs a motion of a robot, prints the errors that it gives, and writes it as CSV and C.
+
+    Returns
+    -------
+    The exit code.
+    """
+    from pvid.configuration.robot_motion import designed_motion
+    from pvid.deploy.motion import motion_header, motion_table
+
+    model = rig.compiled()
+    if model.chain is None:
+        raise PvidError(f"{model.name} is no robot, whose motion --out writes: omit it")
+    if out is None or duration is None:
+        raise PvidError("the motion of a robot needs its length and a file to write: --duration 20 -o motion.csv")
+    with working("designing a motion"):
+        motion = designed_motion(model, duration, rig.sample_rate or 1000.0)
+        fit = motion.predicted()
+    header = out.with_suffix(".h")
+    command = f"pvid design --model {model.name}.py --duration {duration:g} -o {out.name}"
+    write_whole(out, motion_table(motion))
+    write_whole(header, motion_header(motion, out.stem, command))
+    errors = np.sqrt(np.diag(fit.covariance))
+    used = {name: one for name, one in motion.used.items() if one is not None}
+    if as_json:
+        listing = {
+            one.name: {"value": one.guess, "se": None if lost else float(error), "unit": one.unit}
+            for one, error, lost in zip(model.unknowns, errors, fit.undetermined, strict=True)
+        }
+        click.echo(json.dumps({"parameters": listing, "used": used, "gain": motion.gain, "duration_s": duration}))
+        return DONE
+    table = Table("parameter", "in the file", "standard error", title=f"a motion of {duration:g} s")
+    for one, error, lost in zip(model.unknowns, errors, fit.undetermined, strict=True):
+        shown = ("", "not determined") if lost else with_error(one.guess, float(error))
+        table.add_row(escape(f"{one.name} [{one.unit}]"), *shown)
+    Console().print(table)
+    click.echo(f"errors of a multisine within the same limits: {motion.gain:.2g} times as large (geometric mean)")
+    parts = [f"{100 * one:.0f} % of the {name}" for name, one in used.items() if name != "box"]
+    click.echo(f"largest use of a limit: {listed(parts)}" + ("; within the box" if "box" in used else ""))
+    click.echo(f"{out}, {header}: {model.title}, {len(model.chain.joints)} joints, {motion.rate:g} ticks a second")
+    return DONE
 
 
 def _measured(asked: Asked, model: CompiledModel, recording: Recording | None) -> list[Cost]:

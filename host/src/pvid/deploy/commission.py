@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pvid.codegen import describe
@@ -102,7 +104,11 @@ def _predicted(d: Deployment, e: Excitation) -> list[str]:
 def _source(d: Deployment, e: Excitation) -> str:
     name, upper = d.name, d.upper
     drives = len(e.drives)
-    tables = [part for k, one in enumerate(e.drives) for part in (_parts(k, one.tones), *_guard_table(k, one.guards))]
+    tables = [
+        part
+        for k, one in enumerate(e.drives)
+        for part in (parts_table(f"part_{k}", one.tones), *_guard_table(k, one.guards))
+    ]
     configs = ",\n".join(_drive(d, e, k, one) for k, one in enumerate(e.drives))
     if drives:
         tables += [
@@ -180,12 +186,13 @@ def _number(value: float) -> str:
     return float_literal(np.float32(value))
 
 
-def _parts(number: int, tones: tuple[Tone, ...]) -> str:
+def parts_table(name: str, tones: Sequence[Tone]) -> str:
+    """Of an excitation."""
     rows = [
         f"{{PVID_EXCITE_TONE, {_number(one.amplitude)}, {_number(one.hz)}, {_number(one.turns)}, 0.0f, 0.0f, NULL, 0u}}"
         for one in tones
     ]
-    return table("pvid_excite_part_f32", f"part_{number}", str(len(rows)), rows)
+    return table("pvid_excite_part_f32", name, str(len(rows)), rows)
 
 
 def _guard_table(number: int, guards: tuple[Guard, ...]) -> list[str]:
@@ -200,17 +207,24 @@ def _guard_table(number: int, guards: tuple[Guard, ...]) -> list[str]:
 
 
 def _drive(d: Deployment, e: Excitation, number: int, one: DesignedDrive) -> str:
+    guard = f"guard_{number}" if one.guards else "NULL"
+    return excite_entry((e.sample_rate, e.ramp_s, e.burst_s), one, f"part_{number}", guard, len(d.samples))
+
+
+def excite_entry(times: tuple[float, float, float], one: DesignedDrive, part: str, guard: str, measured: int) -> str:
+    """A pvid_excite_config_f32 of a table; times: sample rate [Hz], ramp and burst [s]."""
+    rate, ramp_s, burst_s = times
     fields = {
-        "sample_rate_hz": _number(e.sample_rate),
+        "sample_rate_hz": _number(rate),
         "low": _number(-one.limit),
         "high": _number(one.limit),
         "slew": _number(one.slew),
-        "ramp_s": _number(e.ramp_s),
-        "burst_s": _number(e.burst_s),
-        "part": f"part_{number}",
-        "guard": f"guard_{number}" if one.guards else "NULL",
+        "ramp_s": _number(ramp_s),
+        "burst_s": _number(burst_s),
+        "part": part,
+        "guard": guard,
         "parts": f"{len(one.tones)}u",
         "guards": f"{len(one.guards)}u",
-        "measured": f"{len(d.samples)}u",
+        "measured": f"{measured}u",
     }
     return "    {" + ", ".join(f".{key} = {value}" for key, value in fields.items()) + "}"

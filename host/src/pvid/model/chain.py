@@ -27,7 +27,7 @@ Number = Traced | float
 Vector = Sequence[Number]
 INERTIAL = ("m", "hx", "hy", "hz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _PRODUCTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-_OF_JOINT = ("Ia", "Fv", "Fc", "Offset")
+_OF_FILE = ("Fv", "Fc")
 _SNAPPED = 1e-12  # what is as close to 0 or 1 is that
 _DEPENDENT = 1e-9  # part of a column that is left when the columns before it explain it
 _STATES = 60  # random ones, whose rows decide what depends on what
@@ -49,6 +49,11 @@ class Joint:
         [kg*m^2]; None: not known
     rotor : inertia of the motor's rotor at the joint, as the file has it [kg*m^2, kg]; None: there is none
     offset : the torque has a constant offset
+    friction : viscous and dry, as the file has them [N*m*s, N*m; N*s/m, N]; None: not known
+    limits : lowest and highest position [rad, m]
+    speed, torque : their largest sizes [rad/s, m/s], [N*m, N]; None: no limit
+    noise : of the recorded torque [N*m, N]; None: not known
+    points : of the body, in its frame, that stay in the box [m]
     """
 
     name: str
@@ -60,6 +65,12 @@ class Joint:
     inertial: tuple[float, ...] | None = None
     rotor: float | None = None
     offset: bool = False
+    friction: tuple[float, float] | None = None
+    limits: tuple[float, float] | None = None
+    speed: float | None = None
+    torque: float | None = None
+    noise: float | None = None
+    points: tuple[tuple[float, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,10 +103,12 @@ class Base:
 
 @dataclass(frozen=True)
 class Chain:
-    """A robot on a fixed base: joints from the base outwards, and gravity [m/s^2]."""
+    """A robot on a fixed base: joints from the base outwards, gravity [m/s^2], and the lowest and highest corner of the
+    box that its points must not leave, in the base's frame [m]; None: no box."""
 
     joints: tuple[Joint, ...]
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
 
     @cached_property
     def standard(self) -> tuple[Standard, ...]:
@@ -149,6 +162,30 @@ class Chain:
             return found
 
         return traced(self.arguments, function), entries
+
+    def places(self) -> Program:
+        """x, y and z of the points that stay in the box, from the positions: each origin that moves, and the points of
+        each body, or its centre of mass where it has none [m]."""
+
+        def function(given: list[Traced]) -> list[Number]:
+            found: list[Number] = []
+            frames: list[tuple[list[list[Number]], list[Number]]] = []
+            for joint, angle in zip(self.joints, given, strict=True):
+                turned, at = _frame(joint, angle)
+                points = list(joint.points)
+                if not points and joint.inertial is not None and joint.inertial[0] > 0:
+                    points = [tuple(one / joint.inertial[0] for one in joint.inertial[1:4])]  # type: ignore[list-item]
+                if joint.parent >= 0:
+                    above, origin = frames[joint.parent]
+                    at = _sum(origin, _times(above, at))
+                    turned = _transposed([_times(above, column) for column in _transposed(turned)])
+                frames.append((turned, at))
+                found += at if joint.parent >= 0 or joint.prismatic else []
+                for point in points:
+                    found += _sum(at, _times(turned, point))
+            return found
+
+        return traced(self.arguments[: len(self.joints)], function)
 
     @cached_property
     def base(self) -> tuple[Base, ...]:
@@ -210,13 +247,15 @@ class Chain:
         return text
 
     def of_file(self, base: Base) -> float | None:
-        """Its value in the file; None: a part of it is not known, friction never is."""
+        """Its value in the file; None: a part of it is not known."""
         total = 0.0
         for place, factor in base.parts:
             one = self.standard[place]
             joint = self.joints[one.joint]
             if one.kind == "Ia" and joint.rotor is not None:
                 total += factor * joint.rotor
+            elif one.kind in _OF_FILE and joint.friction is not None:
+                total += factor * joint.friction[_OF_FILE.index(one.kind)]
             elif one.kind in INERTIAL and joint.inertial is not None:
                 total += factor * joint.inertial[INERTIAL.index(one.kind)]
             else:
@@ -247,15 +286,9 @@ def _momenta(
     frames: list[tuple[list[list[Number]], list[Number]]] = []
     motion: list[tuple[Vector, Vector, Vector]] = []
     for joint, angle, rate in zip(chain.joints, q, rates, strict=True):
-        fixed: list[list[Number]] = [[_snapped(one) for one in row] for row in joint.turned]
         axis = [_snapped(one) for one in joint.axis]
         w, v, down = motion[joint.parent] if joint.parent >= 0 else (zero, zero, chain.gravity)
-        place: list[Number] = list(joint.origin)
-        turned = fixed
-        if joint.prismatic:
-            place = _sum(place, [one * angle for one in _times(fixed, axis)])
-        else:
-            turned = [_times(_transposed(_rotation(axis, angle)), row) for row in fixed]
+        turned, place = _frame(joint, angle)
         back = _transposed(turned)
         v, w, down = _times(back, _sum(v, _cross(w, place))), _times(back, w), _times(back, down)
         if joint.prismatic:
@@ -295,6 +328,15 @@ def _momenta(
                 angular = _sum(_times(turned, angular), _cross(place, linear))
                 moment = _sum(_times(turned, moment), _cross(place, force))
                 i = joint.parent
+
+
+def _frame(joint: Joint, angle: Traced) -> tuple[list[list[Number]], list[Number]]:
+    """Of its body in its parent's: rotation, and origin."""
+    fixed: list[list[Number]] = [[_snapped(one) for one in row] for row in joint.turned]
+    axis = [_snapped(one) for one in joint.axis]
+    if joint.prismatic:
+        return fixed, _sum(joint.origin, [one * angle for one in _times(fixed, axis)])
+    return [_times(_transposed(_rotation(axis, angle)), row) for row in fixed], list(joint.origin)
 
 
 def _snapped(value: float) -> float:

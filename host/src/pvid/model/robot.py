@@ -29,6 +29,13 @@ class Robot(Model):
         super().__init__(title)
         self.joints: list[Joint] = []
         self.gravity = self._three("gravity", gravity)
+        self.space: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+
+    def box(self, low: Sequence[float], high: Sequence[float]) -> None:
+        """Lowest and highest corner of the space that the points of a designed motion do not leave [m]."""
+        self.space = self._three("box: low", low), self._three("box: high", high)
+        if not all(one < other for one, other in zip(*self.space, strict=True)):
+            raise self._refused(f"box: {tuple(low)} is not below {tuple(high)}")
 
     def joint(
         self,
@@ -44,6 +51,12 @@ class Robot(Model):
         torque_constant: float | None = None,
         resolution: float | None = None,
         hold: Literal["zoh", "sampled"] = "sampled",
+        friction: Sequence[float] | None = None,
+        limits: Sequence[float] | None = None,
+        speed: float | None = None,
+        torque: float | None = None,
+        noise: float | None = None,
+        points: Sequence[Sequence[float]] = (),
     ) -> None:
         """A joint and the body that it moves; the frame of the body has its origin on the axis.
 
@@ -60,6 +73,11 @@ class Robot(Model):
         torque_constant : torque at the joint per ampere [N*m/A]: a current i1 is recorded
         resolution : of the encoder [rad, m]
         hold : "zoh" for a torque that is commanded and held from sample to sample
+        friction : viscous and dry, as the file has them [N*m*s], [N*m]
+        limits, speed, torque : of a motion that is designed: lowest and highest position [rad], largest speed [rad/s]
+            and torque [N*m]; of a joint that slides in m and N
+        noise : of the recorded torque [N*m]; a hundredth of `torque` by default
+        points : of the body, in its frame, that stay in the box [m]; its centre of mass by default
         """
         number = len(self.joints) + 1
         if number > MOST_JOINTS:
@@ -76,6 +94,12 @@ class Robot(Model):
         given = None if inertial is None else tuple(float(one) for one in inertial)
         if given is not None and (len(given) != len(INERTIAL) or not np.isfinite(given).all()):
             raise self._refused(f"{name}: inertial has {len(INERTIAL)} numbers: {', '.join(INERTIAL)}")
+        for what, value in {"speed": speed, "torque": torque, "noise": noise}.items():
+            if value is not None and not 0 < float(value) < math.inf:
+                raise self._refused(f"{name}: {what} must be above 0, not {value}")
+        reach, rubbed = self._two(f"{name}: limits", limits), self._two(f"{name}: friction", friction)
+        if reach is not None and reach[0] >= reach[1]:
+            raise self._refused(f"{name}: limits are the lowest and the highest position, not {limits}")
         if resolution is None:
             resolution = _SCALE if prismatic else _ENCODER
         self.sensor(f"q{number}", "m" if prismatic else "rad", resolution=resolution, reach=math.pi, gain_sd=0.0)
@@ -95,6 +119,12 @@ class Robot(Model):
                 given,
                 None if rotor is None else float(rotor),
                 offset,
+                rubbed,
+                reach,
+                speed,
+                torque,
+                noise,
+                points=tuple(self._three(f"{name}: a point", one) for one in points),
             )
         )
 
@@ -102,7 +132,7 @@ class Robot(Model):
         """Its base parameters and signals; rows are computed by recursion (pvid.model.chain)."""
         if not self.joints:
             raise self._refused(f"{self.title}: the robot has no joint")
-        chain = Chain(tuple(self.joints), self.gravity)
+        chain = Chain(tuple(self.joints), self.gravity, self.space)
         return CompiledModel(
             name or "robot",
             self.title,
@@ -114,6 +144,13 @@ class Robot(Model):
             clock_sd=0.0,
             chain=chain,
         )
+
+    def _two(self, what: str, given: Sequence[float] | None) -> tuple[float, float] | None:
+        if given is None:
+            return None
+        if len(given) != 2 or not math.isfinite(sum(map(float, given))):
+            raise self._refused(f"{what} has two numbers, not {given}")
+        return float(given[0]), float(given[1])
 
     def _three(self, what: str, given: Sequence[float]) -> tuple[float, float, float]:
         try:

@@ -35,7 +35,7 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
     chosen : names of the joints that move and are recorded, in the order of the columns; others are held at their zero;
         (): all
     """
-    mujoco, model = _read(path)
+    mujoco, model, speeds = _read(path)
     joints = _chosen(mujoco, model, path, chosen)
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr] = 0.0
@@ -70,6 +70,15 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
             given["prismatic"] = "True"
         if model.dof_armature[model.jnt_dofadr[joint]] > 0:
             given["rotor"] = _number(float(model.dof_armature[model.jnt_dofadr[joint]]))
+        dof = int(model.jnt_dofadr[joint])
+        if (rubbed := (model.dof_damping[dof], model.dof_frictionloss[dof])) != (0, 0):
+            given["friction"] = _numbers(rubbed)
+        if model.jnt_limited[joint]:
+            given["limits"] = _numbers(model.jnt_range[joint])
+        if speeds.get(name, 0) > 0:
+            given["speed"] = _number(speeds[name])
+        if model.jnt_actfrclimited[joint]:
+            given["torque"] = _number(min(abs(model.jnt_actfrcrange[joint])))
         own = [k for k in range(1, model.nbody) if carrier[k] == place]
         given["inertial"] = _numbers(_inertial(model, data, own, *frames[place]))
         names.append(name)
@@ -79,8 +88,8 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
     return "\n".join([*lines, ""])
 
 
-def _read(path: Path) -> tuple[Any, Any]:
-    """MuJoCo and its model of a file; what is only drawn is not needed of URDF."""
+def _read(path: Path) -> tuple[Any, Any, dict[str, float]]:
+    """MuJoCo, its model of a file, and the speeds that URDF allows; what is only drawn is not needed of URDF."""
     try:
         import mujoco
     except ImportError:
@@ -97,8 +106,10 @@ def _read(path: Path) -> tuple[Any, Any]:
                      if one.get("type") != "fixed" and one.find("child") is not None}  # fmt: skip
             if bare := [one for one in lost if one in moved]:
                 raise PvidError(f"{path}: {listed(map(printable, bare))} moves and has no inertial: add it to the file")
-            return mujoco, mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
-        return mujoco, mujoco.MjModel.from_xml_path(str(path))
+            limits = {one.get("name", ""): one.find("limit") for one in tree.iter("joint")}
+            speeds = {name: float(one.get("velocity", 0)) for name, one in limits.items() if one is not None}
+            return mujoco, mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode")), speeds
+        return mujoco, mujoco.MjModel.from_xml_path(str(path)), {}
     except OSError as error:
         raise PvidError(f"{path}: cannot be read: {error.strerror}") from None
     except (ElementTree.ParseError, UnicodeDecodeError) as error:

@@ -4,8 +4,8 @@ A row is -sum chi' p_i - sum chi g_i + sum chi friction = sum chi tau_i over a w
 chi: linear in the base parameters, without accelerations. Rows of a joint have the covariance sum_m s_im gram(m, m),
 m = 0, 1, 2: white noise of the torque, of the momentum and of its integral, as large as the residuals show.
 
-Dry friction near a reversal is no sgn: it sticks, is soft, or follows a Stribeck curve. What it does there in a short
-time about t_r has the directions chi(t_r), chi'(t_r) and chi''(t_r) in the rows of its joint, which are projected out.
+Dry friction of a slow joint is no sgn: it sticks, is soft, or follows a Stribeck curve. Whatever it does in the slow
+steps of a window, the rows of its joint have it in the range of sum chi chi^T over these steps, which is projected out.
 
 Noise of the encoders is in the regressors as well, in the rates even squared. What that adds to the normal equations
 S p = F is computed from the run: as much noise is added again, and subtracted, and the mean growth of S and F is taken
@@ -41,8 +41,9 @@ _STEPS = 2000  # at a time
 _TURNS, _DRAWS = 4, 4
 _COVERED = 0.1  # of the torques: what a standard error may be worth
 _FEWEST_WINDOWS = 8
-_SLOW = 0.05  # of the root mean square of a rate: below it the sign of friction is in doubt
-_ORDERS, _REVERSALS = 3, 4  # directions of a reversal; most of them in a window that counts
+_SLOW = 0.1  # of the root mean square of a rate: below it dry friction is in doubt
+_CLEAR_RATE = 3.0  # of the noise of a rate, likewise
+_REACHED = 1e-6  # of the energy of a direction: what slow steps have of it
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
 _MOST_BYTES = 4e9  # of the rows, with what is computed from them
 _DIRECTION = 1e-6  # relative size of a direction that is one
@@ -179,30 +180,21 @@ class Segment:
             yield np.array([np.broadcast_to(one, rate.shape[1:]) for one in found])
 
 
-def _doubts(rate: Float, functions: TestFunctions) -> Float:
-    """Directions of the reversals of a joint in its windows [windows, K, directions], from its rates [steps]; all K
-    where there are too many, or one takes longer than the test functions resolve."""
+def _doubts(rate: Float, noise: float, functions: TestFunctions) -> Float:
+    """Directions of the test functions that a joint's slow steps reach in each window [windows, K, K], from its rates
+    [steps] and their noise; the others are 0."""
     hop, k = functions.hop, functions.count
-    windows = len(rate) // hop - 1
-    slow = np.abs(rate) < _SLOW * np.sqrt(np.mean(rate**2))
+    slow = np.abs(rate) < max(_SLOW * float(np.sqrt(np.mean(rate**2))), _CLEAR_RATE * noise)
     slow[1:] |= rate[1:] * rate[:-1] <= 0
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(np.int8), [0]])))
-    begins, ends = edges[::2], edges[1::2]
-    apart = begins[1:] - ends[:-1] > hop / functions.highest  # others are one for the test functions
-    begins, ends = begins[np.append(True, apart)[: len(begins)]], ends[np.append(apart, True)[: len(ends)]]
-    times = np.array([a + np.argmin(np.abs(rate[a:b])) for a, b in zip(begins, ends, strict=True)], np.int64)
-    long = ends - begins > 2 * hop / functions.highest
-    out = np.zeros((windows, k, max(k, _ORDERS * _REVERSALS)))
-    for window in range(windows):
-        inside = (ends > window * hop) & (begins < (window + 2) * hop)
-        own = times[inside] - window * hop
-        if len(own) > _REVERSALS or long[inside].any():
-            out[window, :, :k] = np.eye(k)
-            continue
-        turns = np.exp(1j * np.outer(own * functions.dt, functions.rates))
-        for order in range(_ORDERS):
-            chi = np.real(turns @ (functions.coefficients * ((1j * functions.rates) ** order)[:, np.newaxis]))
-            out[window, :, order : _ORDERS * len(own) : _ORDERS] = chi.T
+    chi = np.real(np.exp(1j * np.outer(np.arange(2 * hop) * functions.dt, functions.rates)) @ functions.coefficients)
+    root = np.linalg.cholesky(functions.gram(0, 0))
+    chi = np.linalg.solve(root, chi.T).T
+    out = np.zeros((len(rate) // hop - 1, k, k))
+    for window, own in enumerate(out):
+        inside = chi[slow[window * hop : (window + 2) * hop]]
+        if len(inside):
+            sizes, directions = np.linalg.eigh(inside.T @ inside)
+            own[:] = root @ (directions * (sizes > _REACHED))
     return out
 
 
@@ -238,6 +230,8 @@ class RobotRows:
                 f"cut the log to {int(most / run.sample_rate)} s"
             )
         tables = [functions.combine(0), -functions.combine(1)]
+        weights = polynomial_weights(run.design.taps, _DEGREE, 1) * run.sample_rate
+        noise = run.design.sd * float(np.linalg.norm(weights))
         parts, known, doubts, follows = [], [], [], []
         for segment in run.values(columns, max(_STEPS // hop, 1) * hop, seed, sign):
             halves = [functions.half_sums(functions.halves(one)) for one in segment.pieces()]
@@ -248,7 +242,7 @@ class RobotRows:
                 own[joint, :, place] += one @ tables[order]
             parts.append(own)
             known.append(functions.window_sums(segment.torque) @ tables[0])
-            doubts.append(np.array([_doubts(one, functions) for one in segment.rate]))
+            doubts.append(np.array([_doubts(*one, functions) for one in zip(segment.rate, noise, strict=True)]))
             follows += [*([True] * (sums.shape[1] - 1)), False]
         if sum(one.shape[1] for one in parts) < _FEWEST_WINDOWS:
             raise PvidError(
@@ -353,7 +347,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     rows = RobotRows.of(whole, columns)
     functions = whole.design.functions
     for k, one in enumerate(rows.white(np.array([np.eye(functions.count)] * len(rows.known))).free):
-        if one <= 0:
+        if one < _DIRECTION:
             raise PvidError(
                 f"q{k + 1} is nowhere clear of a standstill for a window of {functions.length:.3g} s: move this joint "
                 "faster, or for longer in one direction"
