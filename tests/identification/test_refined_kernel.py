@@ -24,6 +24,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "kernels"
 
 
+@pytest.mark.by_day(4)
 @pytest.mark.parametrize("name", names())
 def test_what_was_printed_once_is_read_again(name: str, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """To the letter, and without a derivation: it costs 0.1 to 0.5 s."""
