@@ -21,11 +21,7 @@ from pvid.settings.cores import CORES, FLOAT, STRONG, STRONG_CORES
 
 
 def compare_recording(
-    path: Path,
-    rig: MechanismRig,
-    columns: str | None,
-    targets: Sequence[str] = (),
-    **given: str | None,
+    path: Path, rig: MechanismRig, columns: str | None, targets: Sequence[str] = (), **given: str | None
 ) -> list[Outcome]:
     """The C core against its twin on a recording of a described mechanism, in float32 by default, with the second stage
     where a board has it; then targets against the C core, which stream the first stage alone.
@@ -72,11 +68,7 @@ def _compared(form: str, core: str, found: Comparison, law: str = "stationary") 
 
 
 def _compared_strong(
-    path: Path,
-    rig: MechanismRig,
-    columns: str | None,
-    targets: Sequence[str],
-    given: Mapping[str, str | None],
+    path: Path, rig: MechanismRig, columns: str | None, targets: Sequence[str], given: Mapping[str, str | None]
 ) -> list[Outcome]:
     """The same by the strong form, on this computer and on emulated boards."""
     recording, model = recording_of(path, rig, columns)

@@ -140,11 +140,7 @@ def _excitation(compiled: CompiledModel, rig: MechanismRig, is_integer: bool) ->
         raise PvidError("the sample rate of the commissioning is missing: sample_rate = 2000  # Hz, in the rig file")
     with progress_bar("drives", MOST_DRIVES) as advance:
         return designed(
-            compiled,
-            rig.excitation,
-            rig.sample_rate,
-            samples=weak_functions_of(compiled).samples,
-            progress=advance,
+            compiled, rig.excitation, rig.sample_rate, samples=weak_functions_of(compiled).samples, progress=advance
         )
 
 

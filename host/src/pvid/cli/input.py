@@ -66,11 +66,7 @@ def columns_option(command: Command) -> Command:
 
 def form_options(function: Command) -> Command:
     for option in (
-        click.option(
-            "--form",
-            type=click.Choice(["weak", "strong"]),
-            help="Form of the identifier.  [default: weak]",
-        ),
+        click.option("--form", type=click.Choice(["weak", "strong"]), help="Form of the identifier.  [default: weak]"),
         click.option(
             "--law",
             type=click.Choice(["stationary", "pseudovelocity"]),

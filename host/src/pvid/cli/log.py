@@ -48,10 +48,7 @@ if TYPE_CHECKING:
 @click.argument("port")
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file; copied into the log, for verify.")
-@click.option(
-    "--model",
-    help="A mechanism of `pvid models`, or a model file.  [default: that of the rig file]",
-)
+@click.option("--model", help="A mechanism of `pvid models`, or a model file.  [default: that of the rig file]")
 @click.option(
     "--run",
     "run_path",
@@ -59,13 +56,7 @@ if TYPE_CHECKING:
     help="Recording of the mechanism: the board's design is made from it, and an emulated board's sensors read it.  "
     "[default: a simulation of the guess in the rig file]",
 )
-@click.option(
-    "--core",
-    type=click.Choice(("f32", "q31")),
-    default="f32",
-    show_default=True,
-    help="Arithmetic.",
-)
+@click.option("--core", type=click.Choice(("f32", "q31")), default="f32", show_default=True, help="Arithmetic.")
 @click.option(
     "--form",
     type=click.Choice(tuple(FORMS)),
@@ -74,9 +65,7 @@ if TYPE_CHECKING:
     help="Form of the identifier; strong: in float32, from derivatives of the signals.",
 )
 @click.option(
-    "--refine",
-    is_flag=True,
-    help="The board fits the full equations behind the weak form, in float32 (pvid/refine.h).",
+    "--refine", is_flag=True, help="The board fits the full equations behind the weak form, in float32 (pvid/refine.h)."
 )
 @click.option("--append", is_flag=True, help="Append to an existing log.")
 @click.option("--restart", is_flag=True, help="Restart the board on every (re)connection (needs --rig).")

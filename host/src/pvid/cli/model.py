@@ -141,8 +141,7 @@ def predict(
         (
             name if driven else "a release",
             RigSimulation.of(
-                compiled,
-                rig_of_guess(compiled, name, low, high, rate=hz, duration=length, share=share, start=start),
+                compiled, rig_of_guess(compiled, name, low, high, rate=hz, duration=length, share=share, start=start)
             ),
         )
         for name in (names if driven else names[:1])
@@ -309,10 +308,7 @@ def _strong_design_of(
 
 
 def _refine_design_of(
-    compiled: CompiledModel,
-    recording: Recording | None,
-    design: WeakConfig,
-    soft_signs: dict[str, float],
+    compiled: CompiledModel, recording: Recording | None, design: WeakConfig, soft_signs: dict[str, float]
 ) -> tuple[RefineConfig | None, str | None]:
     """Of the refinement behind the weak form, or why there is none."""
     from pvid.configuration.refine import refine_design, refine_for_simulated_rig
@@ -326,11 +322,7 @@ def _refine_design_of(
 
 
 def _design_of(
-    compiled: CompiledModel,
-    model: str,
-    recording: Recording | None,
-    functions: int | None,
-    found: Identified | None,
+    compiled: CompiledModel, model: str, recording: Recording | None, functions: int | None, found: Identified | None
 ) -> WeakConfig | None:
     from pvid.codegen.generated import GeneratedModel
     from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped

@@ -91,11 +91,7 @@ def _header(functions: ModelFunctions, command: str) -> str:
 def _prototypes(functions: ModelFunctions) -> list[str]:
     lines: list[str] = []
     for function in functions.functions:
-        lines += [
-            f"/* {MEANING[function.name]} {function.program.cost}. */",
-            f"{_signature(functions, function)};",
-            "",
-        ]
+        lines += [f"/* {MEANING[function.name]} {function.program.cost}. */", f"{_signature(functions, function)};", ""]
     return lines
 
 
@@ -206,11 +202,7 @@ def _header_q31(fixed: FixedModel, command: str) -> str:
             "",
         ]
     for what in fixed.of_parameters:
-        lines += [
-            f"/* {MEANING[what.name]} {what.program.cost}. */",
-            f"{_signature_q31(functions, what)};",
-            "",
-        ]
+        lines += [f"/* {MEANING[what.name]} {what.program.cost}. */", f"{_signature_q31(functions, what)};", ""]
     lines += [
         "/* Formats [bits] of inputs and results. */",
         f"extern const int8_t {name}_in_bits_q31[{upper}_INPUTS];",

@@ -165,16 +165,7 @@ def _form(model: WeakModel) -> str:
     unused = [
         f"    (void){name};" for name in ("integral", "t") if not re.search(rf"\b{name}\b", "\n".join([*first, text]))
     ]
-    return "\n".join(
-        [
-            _FORM,
-            "{",
-            *unused,
-            *first,
-            text,
-            "}",
-        ]
-    )
+    return "\n".join([_FORM, "{", *unused, *first, text, "}"])
 
 
 def _signature(function: Function) -> str:

@@ -26,17 +26,7 @@ from pvid.model.operations import program_of
 from pvid.model.signals import Integral, Jet, jets
 from pvid.oracle.weak.channels import Channel, Channels
 from pvid.oracle.weak.identify import ready
-from pvid.settings.weak import (
-    NONE,
-    Source,
-    ThetaModel,
-    WeakChannel,
-    WeakJet,
-    WeakKind,
-    WeakModel,
-    WeakSignal,
-    WeakTerm,
-)
+from pvid.settings.weak import NONE, Source, ThetaModel, WeakChannel, WeakJet, WeakKind, WeakModel, WeakSignal, WeakTerm
 
 _ONE = sp.Integer(1)
 _OF_ROWS = ("integrands", "channels")

@@ -357,10 +357,7 @@ def _responses(within: _Limits) -> dict[tuple[str, str], tuple[float, float]]:
 
 
 def _guards(
-    within: _Limits,
-    drive: str,
-    responses: Mapping[tuple[str, str], tuple[float, float]],
-    samples: Sequence[str],
+    within: _Limits, drive: str, responses: Mapping[tuple[str, str], tuple[float, float]], samples: Sequence[str]
 ) -> tuple[Guard, ...]:
     """Of each limited signal, in the order of the limits: rates first, then values, of which the last one then has the
     last word."""

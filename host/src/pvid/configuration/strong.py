@@ -192,10 +192,7 @@ def _residual_sd(oracle: StrongModel, recording: Recording, fitted: Fitted) -> t
     rows = oracle.rows(recording.signals, recording.sample_rate, settings)
     found = []
     for e, n, theta in zip(
-        residuals(oracle.parameters, rows, fitted.p),
-        rows.regressors,
-        oracle.parameters.theta(fitted.p),
-        strict=True,
+        residuals(oracle.parameters, rows, fitted.p), rows.regressors, oracle.parameters.theta(fitted.p), strict=True
     ):
         size = float(np.sqrt(np.mean((n * theta) ** 2))) or 1.0
         found.append(max(float(np.std(e)), _FLOOR * size))

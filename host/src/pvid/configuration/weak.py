@@ -156,11 +156,7 @@ def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: S
 
 
 def design_for_recording(
-    model: Compiled,
-    run: Run,
-    sample_rate: float,
-    ranking: Sequence[Scored] = (),
-    reversals: Reversals = "averaged",
+    model: Compiled, run: Run, sample_rate: float, ranking: Sequence[Scored] = (), reversals: Reversals = "averaged"
 ) -> Scored:
     """The design of the identifier with the least predicted errors, then a cheaper one that is nearly as good.
 

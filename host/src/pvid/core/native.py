@@ -43,13 +43,7 @@ def _sizes_f32(one: Any) -> tuple[int, int]:
 
 
 _ARITHMETIC: dict[Core, Arithmetic] = {
-    "f32": Arithmetic(
-        np.float32,
-        np.float32,
-        False,
-        1.0,
-        OfEstimator(_sizes_f32, "pvid_estimator_assess_f32"),
-    ),
+    "f32": Arithmetic(np.float32, np.float32, False, 1.0, OfEstimator(_sizes_f32, "pvid_estimator_assess_f32")),
     "q31": Arithmetic(
         np.int32,
         np.int64,

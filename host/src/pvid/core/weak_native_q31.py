@@ -47,10 +47,7 @@ class WeakIdentifierQ31(Publisher):
     """The identifier: readings of every tick in counts."""
 
     def __init__(
-        self,
-        native: WeakNativeQ31,
-        start: npt.ArrayLike | None = None,
-        estimator: EstimatorConfigQ31 | None = None,
+        self, native: WeakNativeQ31, start: npt.ArrayLike | None = None, estimator: EstimatorConfigQ31 | None = None
     ) -> None:
         given = getattr(native.library, f"{native.name}_settings_q31")[0]  # a constant of the library
         self._owned = native.headers.ffi.new("pvid_weak_config_q31 *", given)

@@ -80,11 +80,7 @@ def with_own(model: CompiledModel, own: Iterable[str], recordings: Sequence[str]
     constraints = dict.fromkeys(one.xreplace(value) for one in model.constraints for value in values)
     together = Together(model.unknowns, model.outputs, tuple(values), model.constraints)
     return replace(
-        model,
-        unknowns=tuple(unknowns),
-        outputs=tuple(outputs),
-        together=together,
-        constraints=tuple(constraints),
+        model, unknowns=tuple(unknowns), outputs=tuple(outputs), together=together, constraints=tuple(constraints)
     )
 
 

@@ -194,12 +194,7 @@ def means_of_held(times: FloatArray, values: FloatArray, at: FloatArray, spans: 
 
 
 def _with_jitter(
-    table: Table,
-    repeats: npt.NDArray[np.bool_],
-    fit: _Fit,
-    rate: float,
-    promised: float | None,
-    note: tuple[str, ...],
+    table: Table, repeats: npt.NDArray[np.bool_], fit: _Fit, rate: float, promised: float | None, note: tuple[str, ...]
 ) -> Uniform:
     size = f"by up to {fit.largest:.2g} periods ({fit.largest * fit.period:.2g} s, {table.place(fit.worst)})"
     stamped_late = fit.largest * fit.period <= _LATE_S

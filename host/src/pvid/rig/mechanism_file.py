@@ -188,12 +188,7 @@ class MechanismRig:
         following = replace(model.following, **self.identifier)
         clock_sd = model.clock_sd if self.clock_sd is None else self.clock_sd
         own = replace(
-            model,
-            knowns=knowns,
-            signals=tuple(signals),
-            unknowns=unknowns,
-            following=following,
-            clock_sd=clock_sd,
+            model, knowns=knowns, signals=tuple(signals), unknowns=unknowns, following=following, clock_sd=clock_sd
         )
         return own.with_options([name for name, chosen in self.refine.items() if chosen])
 

@@ -343,11 +343,7 @@ def _bridged(clocked: Uniform, table: Table) -> Recording:
 
 
 def _gap_notes(
-    clocked: Uniform,
-    of: str,
-    firsts: npt.NDArray[np.int64],
-    ends: npt.NDArray[np.int64],
-    filled: npt.NDArray[np.bool_],
+    clocked: Uniform, of: str, firsts: npt.NDArray[np.int64], ends: npt.NDArray[np.int64], filled: npt.NDArray[np.bool_]
 ) -> list[str]:
     lengths = ends - firsts
     rate = clocked.sample_rate

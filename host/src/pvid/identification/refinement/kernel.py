@@ -96,12 +96,7 @@ class RefinedKernel:
         return out
 
     def steps(
-        self,
-        samples: int,
-        rate: float,
-        r: Float,
-        widths: Mapping[str, float] | None = None,
-        coarse: int | None = None,
+        self, samples: int, rate: float, r: Float, widths: Mapping[str, float] | None = None, coarse: int | None = None
     ) -> tuple[int, int, Float]:
         """Steps a sample, those of them that are one where no friction reverses, and r with widths of the signs.
 

@@ -117,7 +117,7 @@ def _code(made: RefineFunctions, read_before: bool) -> str:
     export = [
         f"void refine_derivatives(const double *r, const double *q, const double *v, const double *u, {arrays}) "
         f"{{ double m[NUMBER_OF_CONSTANTS + 1]; pvid_refine_constants(r, m); "
-        f"pvid_refine_jacobian(m, q, v, u, {', '.join(jacobian)}); }}",
+        f"pvid_refine_jacobian(m, q, v, u, {', '.join(jacobian)}); }}"
     ]
     export += ["int refine_region(const double *r) { return pvid_refine_region(r); }"]
     if "chart" in made.functions:

@@ -6,10 +6,7 @@ from pvid.models.simulated_rig import SimulatedRig
 RIG = SimulatedRig(
     model="heater",
     truth=dict(C=80.0, h=0.35, h2=1.5e-3),
-    drive={
-        "P": Steps((60.0, 0.0, 30.0, 60.0, 15.0, 0.0, 45.0), 120.0),
-        "Ta": Sines(((0.5, 1e-3, 0.0),), offset=295.0),
-    },
+    drive={"P": Steps((60.0, 0.0, 30.0, 60.0, 15.0, 0.0, 45.0), 120.0), "Ta": Sines(((0.5, 1e-3, 0.0),), offset=295.0)},
     start={"T": 295.0},
     sample_rate=2.0,
     duration=2400.0,

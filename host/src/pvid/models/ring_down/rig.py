@@ -3,10 +3,5 @@
 from pvid.models.simulated_rig import SimulatedRig
 
 RIG = SimulatedRig(
-    model="ring_down",
-    truth=dict(w2=2220.0, d=0.9, x0=2e-4),
-    drive={},
-    start={"x": 3e-3},
-    duration=5.0,
-    window_s=0.5,
+    model="ring_down", truth=dict(w2=2220.0, d=0.9, x0=2e-4), drive={}, start={"x": 3e-3}, duration=5.0, window_s=0.5
 )

@@ -36,13 +36,7 @@ _LENGTHS = 6
 _FUNCTIONS = (12, 24, 40)
 _FEW_FUNCTIONS = (5, 8)  # of runs with motion that the equations do not explain: it is above the drive's frequencies
 _RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
-_FLAT_RATES = (
-    (11, 4),
-    (21, 6),
-    (41, 8),
-    (81, 8),
-    (141, 8),
-)  # for a drive that is measured: see pvid.oracle.weak.blur
+_FLAT_RATES = ((11, 4), (21, 6), (41, 8), (81, 8), (141, 8))  # for a drive that is measured: see pvid.oracle.weak.blur
 
 # Enough to compare designs, each from the best p so far: a step is far below what scores differ by.
 _PASSES = 10
@@ -331,11 +325,7 @@ def _order(one: Scored) -> tuple[bool, float]:
 
 
 def _searched(
-    model: Compiled,
-    run: Mapping[str, npt.ArrayLike],
-    designs: Iterable[WeakDesign],
-    start: Float | None,
-    fewest: int,
+    model: Compiled, run: Mapping[str, npt.ArrayLike], designs: Iterable[WeakDesign], start: Float | None, fewest: int
 ) -> list[Scored]:
     """Of each design the minimum of least chi^2 that other starts than the guesses lead to, if any is plausible."""
     starts = list(starts_about(model.parameters, model.parameters.checked(start)))
