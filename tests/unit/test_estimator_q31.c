@@ -2,8 +2,8 @@
 #include "test.h"
 
 #include "number/scaled_q31.h"
+#include "identity_q31.h"
 #include "pendulum_model_q31.h"
-#include "pvid/pvid_q31.h"
 #include "solve/system_q31.h"
 
 #define ONE_Q20 (1 << 20) /* of rows */
@@ -16,8 +16,7 @@ static pvid_estimator_solve_q31 solve;
 /* w, d1, d2 of 2, 3, 1 and c of 0. */
 static int start_again(void **state)
 {
-    memset(&config, 0, sizeof config);
-    config.model = &pendulum_model_q31;
+    config = usual_config_q31(&pendulum_model_q31);
     for (int i = 0; i < 4; i++) {
         config.start[i] = (i < 3) ? ((i == 2) ? ONE_Q26 : ((2 + i) * ONE_Q26)) : 0;
         config.start_sd[i] = ONE_Q26;
@@ -29,12 +28,7 @@ static int start_again(void **state)
         config.n_bits[i] = 20;
     }
     config.y_bits = 20;
-    config.row_sd = 256;
-    config.gain = 1 << 30;
-    config.correlation = 1u << 16;
-    config.row_weight = 1u << 16;
     config.step_limit = 58982;
-    config.divider = 1;
     return 0;
 }
 
@@ -226,38 +220,7 @@ static void without_rows_the_start_is_published(void **state)
     assert_int_equal(estimate.weight, 0);
 }
 
-/* Identity theta = p: M is S, so that what a step needs is known. */
-static void own_theta(const int32_t p[], int64_t theta[])
-{
-    theta[0] = p[0];
-    theta[1] = p[1];
-}
-
-static void own_jacobian(const int32_t p[], int64_t c[])
-{
-    (void)p;
-    c[0] = 1 << 20;
-    c[1] = 1 << 20;
-}
-
-static void own_formats(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
-{
-    for (int i = 0; i < 2; i++) {
-        theta_bits[i] = p_bits[i];
-        c_bits[i] = 20;
-    }
-}
-
-static const uint8_t own_places[2] = {0, 1};
-static const pvid_model_q31 own_model = {.n_theta = 2,
-                                         .n_p = 2,
-                                         .n_kinds = 1,
-                                         .n_c = 2,
-                                         .c_row = own_places,
-                                         .c_column = own_places,
-                                         .theta = own_theta,
-                                         .jacobian = own_jacobian,
-                                         .formats = own_formats};
+static const pvid_model_q31 own_model = IDENTITY_Q31(2);
 
 static void begin_own(void)
 {

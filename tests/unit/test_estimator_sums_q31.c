@@ -4,50 +4,17 @@
 
 #include <stdlib.h>
 
+#include "identity_q31.h"
 #include "number/count.h"
 #include "solve/assess_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "pvid/pvid.h"
-#include "pvid/pvid_q31.h"
 #include "number/scaled_q31.h"
 
 /* ---- y = N^T p with as many entries as there may be parameters ---- */
 
-static void theta_of(const int32_t p[], int64_t theta[])
-{
-    for (size_t i = 0; i < PVID_MAX_P; i++) {
-        theta[i] = p[i];
-    }
-}
-
-static void jacobian_of(const int32_t p[], int64_t c[])
-{
-    (void)p;
-    for (size_t i = 0; i < PVID_MAX_P; i++) {
-        c[i] = 1 << 20;
-    }
-}
-
-static void formats_of(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
-{
-    for (size_t i = 0; i < PVID_MAX_P; i++) {
-        theta_bits[i] = p_bits[i];
-        c_bits[i] = 20;
-    }
-}
-
-static const uint8_t places[PVID_MAX_P] = {0, 1, 2, 3};
-static const pvid_model_q31 model = {
-    .n_theta = PVID_MAX_P,
-    .n_p = PVID_MAX_P,
-    .n_c = PVID_MAX_P,
-    .c_row = places,
-    .c_column = places,
-    .theta = theta_of,
-    .jacobian = jacobian_of,
-    .formats = formats_of,
-};
+static const pvid_model_q31 model = IDENTITY_Q31(PVID_MAX_P);
 static const double truth[PVID_MAX_P] = {0.75, -0.5, 0.25, 0.6};
 #define P_ONE (1 << 24)
 
@@ -56,8 +23,7 @@ static uint32_t generator;
 
 static int start_again(void **state)
 {
-    memset(&config, 0, sizeof config);
-    config.model = &model;
+    config = usual_config_q31(&model);
     for (size_t i = 0; i < PVID_MAX_P; i++) {
         config.start[i] = P_ONE / 2;
         config.start_sd[i] = 4 * P_ONE;
@@ -68,11 +34,7 @@ static int start_again(void **state)
     }
     config.y_bits = 20;
     config.row_sd = 256 * 64; /* 64 of Y's integer */
-    config.gain = 1 << 30;
-    config.correlation = 1u << 16;
-    config.row_weight = 1u << 16;
     config.step_limit = 58982;
-    config.divider = 1;
     generator = 9u;
     return 0;
 }

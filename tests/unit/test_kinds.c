@@ -1,10 +1,10 @@
 /* Rows of several kinds: M by blocks, against dense arithmetic in double; what init and add refuse. */
 #include "test.h"
 
+#include "identity_q31.h"
 #include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "pvid/pvid.h"
-#include "pvid/pvid_q31.h"
 #include "pvid/scaled_q31.h"
 
 /* Three kinds with 2, 1 and 3 theta; p[1] occurs in all of them. theta = p0, p1, p1 p2, p1, p2, p0 p1. */
@@ -359,16 +359,8 @@ static pvid_model_q31 fixed = {
 
 static pvid_estimator_config_q31 fixed_config(void)
 {
-    pvid_estimator_config_q31 fresh = {
-        .model = &fixed,
-        .y_bits = 10,
-        .row_sd = 256,
-        .gain = 1 << 30,
-        .correlation = 1u << 16,
-        .row_weight = 1u << 16,
-        .step_limit = 19661,
-        .divider = 1,
-    };
+    pvid_estimator_config_q31 fresh = usual_config_q31(&fixed);
+    fresh.y_bits = 10;
     for (size_t a = 0; a < N_P; a++) {
         fresh.start[a] = 3 << 23; /* 1.5 */
         fresh.start_sd[a] = 1 << 24;

@@ -2,8 +2,8 @@
  * tests/core/test_bad_config.py, and under sanitizers by tests/fuzz/fuzz_api.c. */
 #include "test.h"
 
+#include "identity_q31.h"
 #include "pvid/pvid.h"
-#include "pvid/pvid_q31.h"
 
 #define THETA_F32 9 /* whose 45 moments are PVID_MAX_MOMENTS */
 #define MOST_C ((PVID_MAX_THETA * PVID_MAX_P) + 1)
@@ -76,20 +76,13 @@ static void begin(void)
         .jacobian = jacobian_q31,
         .formats = formats_q31,
     };
-    const pvid_estimator_config_q31 fresh_config = {.model = &fixed,
-                                                    .row_sd = 256,
-                                                    .gain = 1 << 30,
-                                                    .correlation = 1u << 16,
-                                                    .row_weight = 1u << 16,
-                                                    .step_limit = 19661,
-                                                    .divider = 1};
     model = fresh;
     fixed = fresh_fixed;
     config = pvid_estimator_defaults_f32;
     config.model = &model;
     config.row_sd = 1.0e-4f;
     config.update_rate_hz = 1024.0f;
-    fixed_config = fresh_config;
+    fixed_config = usual_config_q31(&fixed);
     for (size_t i = 0; i < PVID_MAX_P; i++) {
         config.start[i] = 8.0f;
         config.start_sd[i] = 2.0f;

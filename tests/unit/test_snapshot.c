@@ -4,9 +4,12 @@
 #include "test.h"
 
 #include "first_order.h"
+#include "kapitza_plant_q31.h"
 #include "number/fingerprint_numbers_f32.h"
 #include "solve/settings_q31.h"
 #include "pvid/pvid.h"
+#include "pvid/pvid_q31.h"
+#include "pvid/snapshot_weak_q31.h"
 
 #define ROOM PVID_SNAPSHOT_WEAK_F32
 
@@ -160,6 +163,20 @@ static void snapshot_of_another_object_names_its_kind(void **state)
     assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_DAMAGED);
 }
 
+static void a_snapshot_of_the_other_core_is_of_another_kind(void **state)
+{
+    static pvid_weak_q31 fixed;
+    static uint8_t of_fixed[PVID_SNAPSHOT_WEAK_Q31];
+    const pvid_weak_config_f32 config = weak_config();
+    start_and_save(&config);
+    assert_int_equal(pvid_weak_init_q31(&fixed, &kapitza_config_q31), PVID_OK);
+    const size_t n = pvid_snapshot_save_weak_q31(&fixed, &kapitza_config_q31, 1, of_fixed, sizeof of_fixed);
+    assert_int_equal(restore(&config, of_fixed, n), PVID_SNAPSHOT_OTHER_KIND);
+    assert_int_equal(pvid_snapshot_restore_weak_q31(&fixed, &kapitza_config_q31, image, sizeof image),
+                     PVID_SNAPSHOT_OTHER_KIND);
+    assert_int_equal(restore(&config, image, sizeof image), PVID_SNAPSHOT_RESTORED);
+}
+
 static void a_table_that_changed_is_another_design(void **state)
 {
     const pvid_weak_config_f32 config = weak_config();
@@ -280,6 +297,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test(every_damaged_byte_is_seen_and_nothing_is_changed),
     cmocka_unit_test(every_length_that_is_too_short_is_refused),
     cmocka_unit_test(snapshot_of_another_object_names_its_kind),
+    cmocka_unit_test(a_snapshot_of_the_other_core_is_of_another_kind),
     cmocka_unit_test(a_table_that_changed_is_another_design),
     cmocka_unit_test(the_format_of_rows_counts),
     cmocka_unit_test(slots_are_used_in_turn),

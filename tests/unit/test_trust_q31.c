@@ -1,8 +1,8 @@
 /* Which estimates of the fixed-point core are published: the gate, the alarm, the way back. */
 #include "test.h"
 
+#include "identity_q31.h"
 #include "pendulum_model_q31.h"
-#include "pvid/pvid_q31.h"
 
 typedef pvid_estimate_q31 an_estimate;
 
@@ -25,13 +25,7 @@ static double moved;
 static int start_again(void **state)
 {
     moved = 0.0;
-    pvid_estimator_config_q31 config = {.model = &pendulum_model_q31,
-                                        .row_sd = 256,
-                                        .gain = 1 << 30,
-                                        .correlation = 1u << 16,
-                                        .row_weight = 1u << 16,
-                                        .step_limit = 19661,
-                                        .divider = 1};
+    pvid_estimator_config_q31 config = usual_config_q31(&pendulum_model_q31);
     for (int i = 0; i < 4; i++) {
         config.start[i] = (i < 3) ? (10 << 20) : 0;
         config.start_sd[i] = 1 << 20;

@@ -297,6 +297,23 @@ static void ticks_behind_the_join_are_those_without_harmonics(void **state)
     assert_int_equal(pvid_weak_ticks_behind_join_q31(&design), 1);
 }
 
+static void a_weight_beyond_its_counter_is_its_end(void **state)
+{
+    start();
+    pvid_information_q31 *information = &identifier.estimator.information;
+    pvid_estimate_q31 estimate;
+    int64_t *weight = &information->sums[information->n_sums - 1u];
+    *weight = ((int64_t)UINT32_MAX << 16) + 65535;
+    pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+    assert_true(estimate.weight == UINT32_MAX);
+    *weight = (int64_t)1 << 50;
+    pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+    assert_true(estimate.weight == UINT32_MAX);
+    *weight = ((int64_t)UINT32_MAX - 1) << 16;
+    pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+    assert_true(estimate.weight == UINT32_MAX - 1u);
+}
+
 /* ---- snapshots ---- */
 
 static uint8_t image[PVID_SNAPSHOT_WEAK_Q31];
@@ -442,6 +459,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test_setup(a_window_takes_the_stages_that_init_counts_with, start_again),
     cmocka_unit_test_setup(the_noise_is_computed_where_it_is_used, start_again),
     cmocka_unit_test_setup(ticks_behind_the_join_are_those_without_harmonics, start_again),
+    cmocka_unit_test_setup(a_weight_beyond_its_counter_is_its_end, start_again),
     cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
     cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
     cmocka_unit_test(the_lead_is_what_the_front_end_needs),
