@@ -4,12 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 
 from bench.kinds import KINDS
 from pvid.base.console import DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
-from pvid.cli.main import commands
 from pvid.compare.strong import StrongComparison
 from pvid.configuration.strong import strong_design
 from pvid.rig.run import Recording
@@ -17,11 +16,6 @@ from pvid.settings.enums import Law
 from pvid.sim.simulated_run import simulation_of
 
 TICKS = 1200
-
-
-def pvid(*arguments: str | Path) -> Result:
-    """A command in this process; a refusal raises."""
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
 def recording(name: str, ticks: int = TICKS) -> Recording:

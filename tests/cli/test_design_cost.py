@@ -6,25 +6,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 
 from pvid.base.console import DIFFERENT, DONE
 from pvid.base.errors import PvidError
 from pvid.board import design_cost, sizes
 from pvid.board.boards import BOARDS, Board
 from pvid.board.replay_image import ReplayReport
-from pvid.cli.main import commands
 from pvid.configuration import refine as refine_design
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.refine import RefineConfig
 
 BOARD = "mps2-an386"
 TIMEOUT_S = 60.0
-
-
-def pvid(*arguments: str | Path) -> Result:
-    """A command in this process; a refusal raises."""
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
 @pytest.fixture(scope="module")

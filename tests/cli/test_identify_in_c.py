@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 from own_mechanisms import OWN
 from pendulum_plant import STANDARD_PENDULUM, STANDARD_RELEASE, simulate
 from pendulum_run import write_run
@@ -22,7 +22,6 @@ from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.target import HOST_TARGET
 from pvid.board.verify_board import verify_recording
 from pvid.cli.identify_run import recording_of
-from pvid.cli.main import commands
 from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import config_to_identify
 from pvid.identification.analysis import analysed
@@ -35,12 +34,6 @@ from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 from pvid.twin.printed import PrintedTwin
-
-
-def pvid(*arguments: str | Path) -> Result:
-    """A command in this process; a refusal raises."""
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
-
 
 RUNS: dict[str, tuple[str, ...]] = {
     "rigid_body": ("--duration", "8"),

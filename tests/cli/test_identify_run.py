@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
+from in_process import pvid
 from rich.console import Console
 
 from pvid.base import console
@@ -37,11 +38,6 @@ theta = model.sensor("theta", "rad", resolution=1e-3, reach=2)
 w, b = model.unknown("w", "1/s^2", 20.0), model.unknown("b", "1/s", 0.1)
 model.equation(theta.d(2) + b * theta.d() + w * sin(theta))
 """
-
-
-def pvid(*arguments: str | Path) -> Result:
-    """A command in this process; a refusal raises."""
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
 def test_a_table_of_80_columns_loses_no_letter() -> None:

@@ -7,17 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 
 from pvid.base.console import DONE
 from pvid.base.errors import PvidError
-from pvid.cli.main import commands
 from pvid.identification.survey import lines_of_a_model, proposals, surveyed, unit_of_name
 from pvid.models.simulated_rig import simulated_rig
-
-
-def pvid(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
 def written(path: Path, head: str, columns: list[list[str]]) -> Path:

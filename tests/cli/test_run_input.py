@@ -12,24 +12,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 from own_mechanisms import OWN, own_recording
 from pendulum_plant import STANDARD_PENDULUM, simulate, standard_sensors
 from pendulum_run import Run, read_run, write_run
 
 from pvid.base.errors import PvidError
-from pvid.cli.main import commands
 from pvid.log.rig_choice import rig_of
 from pvid.rig.mechanism_file import MechanismRig, rig_path_of
 from pvid.rig.run import Recording
 from pvid.sim.simulated_run import simulation_of
 
 Float = npt.NDArray[np.float64]
-
-
-def pvid(*arguments: str | Path) -> Result:
-    """The command's result; a refusal is raised."""
-    return CliRunner().invoke(commands, [*map(str, arguments)], standalone_mode=False, catch_exceptions=False)
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 
 import pvid as api
 from pvid.base.console import DONE
 from pvid.base.errors import PvidError
-from pvid.cli.main import commands
 
 TRUTH = {"m": 1.0, "b": 1.0, "k": 50.0}
 SPRING = """
@@ -22,11 +21,6 @@ x = model.sensor("x", "m", resolution=1e-5, reach=0.1)
 m, b, k = model.unknown("m", "kg", 1.0), model.unknown("b", "N*s/m", 1.0), model.unknown("k", "N/m", 50.0)
 model.equation(m * x.d(2) + b * x.d() + k * x - F)
 """
-
-
-def pvid(*arguments: str | Path) -> Result:
-    """A command in this process; a refusal raises."""
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
 @pytest.fixture(scope="module")

@@ -9,22 +9,16 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 
 from pvid.base.console import DONE
 from pvid.base.errors import PvidError
-from pvid.cli.main import commands
 from pvid.model import Model
 from pvid.models.mechanisms import compiled_of, described
 
 Float = npt.NDArray[np.float64]
 
 SUB = 10  # steps a sample
-
-
-def pvid(*arguments: str | Path) -> Result:
-    """A command in this process; a refusal raises."""
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
 def simulated(rate: float, u: Float, start: list[float], slope: Callable[[Float, float], list[float]]) -> Float:

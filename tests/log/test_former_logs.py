@@ -5,10 +5,9 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from in_process import pvid
 
 from pvid.base.console import NOTHING_IDENTIFIED
-from pvid.cli.main import commands
 
 LOGS = Path(__file__).parents[1] / "data" / "logs"
 PENDULUM = {"w": 9.5 / 0.25, "d1": 7.9352, "d2": 4.6875}  # of the simulated sensors, with a rod of 0.25 m
@@ -20,10 +19,6 @@ FORMER = [  # checks, samples, truth
     ("pendulum_refined", 185, 1240, PENDULUM),
     ("motor_weak", 24, 1200, MOTOR),
 ]
-
-
-def pvid(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
 
 
 @pytest.mark.parametrize(("name", "checks", "samples", "truth"), FORMER)
