@@ -134,12 +134,13 @@ def log_of(
     noise: float = 0.02,
     viscous: float = 0.5,
     dry: float = 1.0,
+    soft: float = 0.0,
 ) -> dict[str, Float]:
     """A recording of an arm: encoders with so many bits a turn, white noise of `blur` of their steps, and torques with
-    relative noise."""  # fmt: skip
+    relative noise; `soft`: the speed at which dry friction has tanh(1) of its size."""  # fmt: skip
     t, q, v, a = motion(len(chain.joints), seconds, rate, seed)
     exact = torques(chain, q, v, a)
-    exact += viscous * v + dry * np.sign(v)
+    exact += viscous * v + dry * (np.tanh(v / soft) if soft else np.sign(v))
     random, step = np.random.default_rng(seed + 1000), 2 * math.pi / 2**bits
     positions = np.round((q + blur * step * random.normal(size=q.shape)) / step) * step
     measured = exact + noise * exact.std(axis=1, keepdims=True) * random.normal(size=exact.shape)

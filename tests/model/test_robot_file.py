@@ -164,7 +164,7 @@ def test_a_model_file_is_not_written_by_another_name(tmp_path: Path) -> None:
 def test_a_coarse_encoder_is_doubted(tmp_path: Path) -> None:
     chain = chain_of(tmp_path, URDF)
     warnings = []
-    for bits in (14, 11):
+    for bits in (14, 13):
         log = robot_arms.log_of(chain, 1, bits=bits, blur=0.0)
         warnings.append(pvid.identify(log, model=tmp_path / "robot.py").warning)
     assert warnings[0] is None

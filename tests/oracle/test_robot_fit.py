@@ -56,6 +56,18 @@ def test_standard_errors_cover_the_truth() -> None:
     assert max(np.sqrt(one.covariance[0, 0]) / abs(truth_of(SPATIAL)[0]) for one in found) < 0.01
 
 
+def test_friction_that_is_soft_near_a_reversal_does_no_harm() -> None:
+    off = off_by(fits(10, soft=0.02), "p")
+    assert np.mean(np.abs(off) < 2) > 0.90 and 0.8 < np.sqrt(np.mean(off**2)) < 1.2  # 94.8 % and 1.03
+
+
+def test_friction_that_is_soft_at_higher_speeds_is_doubted() -> None:
+    widths = {width: np.array([np.abs(one.of_slow).max() for one in fits(6, soft=width)]) for width in (0.0, 0.05, 0.1)}
+    assert np.abs(off_by(fits(6, soft=0.1), "p")).max() > 5  # the standard errors do not hold
+    assert widths[0.0].max() < 5.0  # as of _SOFT: Student's t of 18 windows once in 10 000
+    assert np.mean(widths[0.05] > 5.0) > 0.5 and np.mean(widths[0.1] > 5.0) > 0.8
+
+
 def test_noise_of_the_encoders_biases_and_the_bias_is_taken_off() -> None:
     found = fits(10, bits=14, blur=1.0, noise=0.002)
     biased, unbiased = (np.mean(off_by(found, one), axis=0) for one in ("uncorrected", "p"))

@@ -42,6 +42,7 @@ _TURNS, _DRAWS = 4, 4
 _COVERED = 0.1  # of the torques: what a standard error may be worth
 _FEWEST_WINDOWS = 8
 _SLOW = 0.1  # of the root mean square of a rate: below it dry friction is in doubt
+_FAST = 0.4  # likewise: below it a joint is slow
 _CLEAR_RATE = 3.0  # of the noise of a rate, likewise
 _REACHED = 1e-6  # of the energy of a direction: what slow steps have of it
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
@@ -335,6 +336,25 @@ class RobotFit:
             slopes = np.apply_along_axis(filtered, -1, whole[1], weights)
             yield segment.torque[:, inner], (whole[0] + slopes)[..., inner]
 
+    @cached_property
+    def of_slow(self) -> Float:
+        """Student's t of each joint [n], over windows: residuals that have the sign of its rate while it is slow.
+
+        Fc and Fv take what friction does in the mean of all speeds; what is no dry and viscous friction remains.
+        """
+        taps, window = 2 * self.design.taps + 1, 2 * self.design.functions.hop
+        long = [one for one in self.run.values(self.columns, _STEPS) if one.position.shape[1] >= taps]
+        rates = [one.rate[:, taps // 2 : one.rate.shape[1] - taps // 2] for one in long]
+        sizes = np.sqrt(np.mean(np.concatenate(rates, axis=1) ** 2, axis=1))[:, np.newaxis]
+        sums = []
+        for rate, (measured, predicted) in zip(rates, self.predicted(self.run, self.p[np.newaxis]), strict=True):
+            slow = (np.abs(rate) > _SLOW * sizes) & (np.abs(rate) < _FAST * sizes)
+            own = (measured - predicted[:, 0]) * np.sign(rate) * slow
+            whole = own[:, : own.shape[1] // window * window]
+            sums.append(whole.reshape(len(own), -1, window).sum(axis=2))
+        found = np.concatenate(sums, axis=1)
+        return np.asarray(found.mean(axis=1) / (found.std(axis=1, ddof=1) / np.sqrt(found.shape[1]) + 1e-300))
+
 
 @np.errstate(invalid="ignore")  # what the noise of the encoders covers has no standard error
 def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> RobotFit:
@@ -350,7 +370,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
         if one < _DIRECTION:
             raise PvidError(
                 f"q{k + 1} is nowhere clear of a standstill for a window of {functions.length:.3g} s: move this joint "
-                "faster, or for longer in one direction"
+                "faster, for longer in one direction, or with an encoder of more bits"
             )
     grams = np.array([functions.gram(m, m) for m in range(3)])
     traces = np.trace(grams, axis1=1, axis2=2)[:, np.newaxis, np.newaxis]
