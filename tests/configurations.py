@@ -121,6 +121,7 @@ TRUST = {
     "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.revert_after": Range(0, 65535, Status.OK),
+    "trust.age_max": Range(0, 65535, Status.OK),
 }
 FORM = {"iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,))}
 WEAK = {**RIG_FIELDS, **ESTIMATOR, **TRUST, **FORM}

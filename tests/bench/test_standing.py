@@ -1,9 +1,15 @@
 """bench standing, short: its columns count what they say; no clean run or accident leaves a wrong valid estimate."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench import standing
+from pvid.codegen.weak_library import weak_native_q31
+from pvid.configuration.weak import samples_of
+from pvid.configuration.weak_q31 import weak_q31_for_rig_like_the_shipped
+from pvid.settings.enums import Doubt, Standing
 from pvid.settings.record import Record
 
 
@@ -38,3 +44,22 @@ def test_an_unplugged_sensor_leaves_nothing_wrong_and_valid() -> None:
 def test_a_clean_run_is_valid_at_its_end_and_never_withdrawn() -> None:
     _, published, doubted, _, withdrawn, valid = standing.clean_row("dc_motor", 1, 15.0)
     assert int(published) > 20 and int(doubted) < 0.1 * int(published) and (withdrawn, valid) == ("0", "1 of 1")
+
+
+@pytest.mark.parametrize(("core", "reading"), [("f32", 1e3), ("f32", np.nan), ("q31", 1e3)])
+def test_an_estimate_is_valid_until_its_age(core: str, reading: float) -> None:
+    """Where windows are dropped, or samples rejected one by one."""
+    own = standing.board("kapitza")
+    run = own.simulation.run(1)
+    first = len(run["phi"]) // 2
+    run["phi"][first:] = reading
+    if core == "f32":
+        config = replace(own.config, trust=replace(own.config.trust, age_max=8))
+        record = replace(own, config=config).record(samples_of(config, run))
+    else:
+        made = weak_q31_for_rig_like_the_shipped(own.simulation.model)
+        fixed = replace(made.config, trust=replace(made.config.trust, age_max=8))
+        record = weak_native_q31(made.made, made.parameters, fixed).identifier().run_samples(made.counts_of(run))
+    age, state = record.standing[first:] & 0xFFFF, standing.state_of(record)[first:]
+    assert state[0] == Standing.VALID and age[-1] > 9
+    assert np.array_equal(state == Standing.DOUBTED, age > 8) and record.standing[-1] >> 24 == Doubt.AGED

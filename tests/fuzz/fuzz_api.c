@@ -226,6 +226,7 @@ static void configure_weak(bool sound)
     config->iterations = one_in(8) ? (uint8_t)any_word() : config->iterations;
     config->trust.groups_min = one_in(8) ? (uint16_t)any_word() : config->trust.groups_min;
     config->trust.revert_after = one_in(8) ? (uint16_t)below(3) : config->trust.revert_after;
+    config->trust.age_max = one_in(8) ? (uint16_t)below(3) : config->trust.age_max;
     config->design = one_in(20) ? NULL : config->design;
 }
 

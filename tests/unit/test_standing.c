@@ -51,7 +51,7 @@ static void an_estimate_is_valid_behind_eight_windows_that_fit(void **state)
     is(PVID_STANDING_VALID, 0);
     assert_int_equal(judge.now.age, 0);
     take(held(ONE), 3);
-    pvid_standing_skip(&judge, false);
+    pvid_standing_skip(&judge, false, 0);
     is(PVID_STANDING_VALID, 0);
     assert_int_equal(judge.now.age, 4);
 }
@@ -145,7 +145,7 @@ static void six_rejected_windows_of_sixteen_are_a_doubt(void **state)
 {
     take(good(), 20);
     for (int i = 0; i < 5; i++) {
-        pvid_standing_skip(&judge, true);
+        pvid_standing_skip(&judge, true, 0);
     }
     is(PVID_STANDING_VALID, 0);
     judge.rejects = true; /* of one kind */
@@ -155,6 +155,35 @@ static void six_rejected_windows_of_sixteen_are_a_doubt(void **state)
     is(PVID_STANDING_DOUBTED, PVID_DOUBT_REJECTS);
     take(good(), 2);
     is(PVID_STANDING_VALID, 0);
+}
+
+static void an_estimate_ends_to_be_valid_by_its_age(void **state)
+{
+    uint8_t number;
+    pvid_standing_window mute = held(ONE);
+    take(good(), 20);
+    for (int i = 0; i < 30; i++) {
+        pvid_standing_skip(&judge, (i % 8) == 7, 30);
+    }
+    is(PVID_STANDING_VALID, 0);
+    pvid_standing_skip(&judge, false, 30);
+    is(PVID_STANDING_DOUBTED, PVID_DOUBT_AGED);
+    mute.age_max = 30;
+    mute.solved = false; /* at rest: what is merely old is no reason to start again */
+    take(mute, 20);
+    assert_false(pvid_standing_starts(&judge, false, &number));
+    pvid_standing_window fresh = good();
+    fresh.age_max = 30;
+    take(fresh, 1);
+    is(PVID_STANDING_VALID, 0);
+    take(mute, 30);
+    is(PVID_STANDING_VALID, 0);
+    take(mute, 1);
+    is(PVID_STANDING_DOUBTED, PVID_DOUBT_AGED);
+    for (uint32_t i = 0; i < 70000u; i++) {
+        pvid_standing_skip(&judge, false, 0);
+    }
+    assert_int_equal(judge.now.age, 65535);
 }
 
 static void an_opening_withdraws_and_starts_at_the_trusted_p(void **state)
@@ -238,6 +267,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test_setup(windows_before_p_arrives_are_no_misfit, start_again),
     cmocka_unit_test_setup(without_a_limit_of_misfit_there_is_none, start_again),
     cmocka_unit_test_setup(six_rejected_windows_of_sixteen_are_a_doubt, start_again),
+    cmocka_unit_test_setup(an_estimate_ends_to_be_valid_by_its_age, start_again),
     cmocka_unit_test_setup(an_opening_withdraws_and_starts_at_the_trusted_p, start_again),
     cmocka_unit_test_setup(six_starts_in_turn_then_a_pause, start_again),
     cmocka_unit_test_setup(a_misfit_before_the_first_publication_starts_nothing, start_again),

@@ -11,8 +11,8 @@ static pvid_trust_q31 trust;
 
 #include "trust_cases.h"
 
-/* The defaults of trust.h: 3e-5, 5 %, 4, 3, 16, 20 %, 0. */
-static const pvid_trust_config_q31 defaults = {32212, 838861, 262144, 3, 16, 13107, 0};
+/* The defaults of trust.h: 3e-5, 5 %, 4, 3, 16, 1000, 20 %, 0. */
+static const pvid_trust_config_q31 defaults = {32212, 838861, 262144, 3, 16, 1000, 13107, 0};
 
 static int64_t q24(double x)
 {

@@ -56,6 +56,8 @@ typedef struct {
     uint16_t groups_min; /* groups before the first publication */
     uint16_t
         revert_after; /* consecutive uninformative groups after which p reverts to the published estimate; 0: never */
+    uint16_t age_max; /* groups without a publication, used or not, behind which the published estimate is doubted; 0:
+                         no limit */
     float renewal;    /* relative change, 0.01..1e3; 0: never. The old sums are renewed when a positive parameter has
                          converged this far from its value at their rows, and the residual variance of all rows is above
                          the alarm's limit */
@@ -64,7 +66,8 @@ typedef struct {
                             their correlations, -1..1. NULL: none. Must outlive the identifier */
 } pvid_trust_config_f32;
 
-/* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %, no shared errors. */
+/* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, age_max 1000, renewal 20 %, no
+ * shared errors. */
 extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 
 /* State: detail/trust_state.h, not API. Only the functions below write to it. */

@@ -24,6 +24,8 @@ typedef struct {
     uint16_t groups_min; /* groups before the first publication */
     uint16_t
         revert_after; /* consecutive uninformative groups after which p reverts to the published estimate; 0: never */
+    uint16_t age_max; /* groups without a publication, used or not, behind which the published estimate is doubted; 0:
+                         no limit */
     uint32_t renewal; /* relative change of p after which the old sums are renewed, Q16, 0.01..1e3; 0: never */
     const int32_t *shared; /* [n_p (n_p + 1) / 2] shared errors: standard deviations >= 0, of a positive parameter
                               relative to p in Q24, else as p; correlations in Q30. NULL: none */

@@ -59,13 +59,20 @@ static uint32_t count_window(pvid_standing_judge *self, bool rejected)
     return (ones(self->history) >= REJECTED_MAX) ? (uint32_t)PVID_DOUBT_REJECTS : 0u;
 }
 
-PVID_COLD void pvid_standing_skip(pvid_standing_judge *self, bool rejected)
+static uint32_t cause_of_age(const pvid_standing_judge *self, uint16_t age_max)
 {
+    return ((age_max > 0u) && (self->now.age > age_max)) ? (uint32_t)PVID_DOUBT_AGED : 0u;
+}
+
+PVID_COLD void pvid_standing_skip(pvid_standing_judge *self, bool rejected, uint16_t age_max)
+{
+    uint32_t causes = 0;
     if (rejected) {
-        doubt(self, count_window(self, true));
+        causes = count_window(self, true);
     } else {
         pvid_count_up_16(&self->now.age);
     }
+    doubt(self, causes | cause_of_age(self, age_max));
 }
 
 /* The mean of the ratios and its limit: 1.5 (1 + 3 standard deviations of chance), chance^2 = 2 / (freedom fits). */
@@ -119,7 +126,7 @@ PVID_COLD bool pvid_standing_take(pvid_standing_judge *self, const pvid_standing
     } else {
         count_up(&self->silent);
         self->valid = 0;
-        doubt(self, causes);
+        doubt(self, causes | cause_of_age(self, window->age_max));
         if (self->contradicted >= 2u) {
             set(self, PVID_STANDING_WITHDRAWN, self->now.causes | (uint32_t)PVID_DOUBT_CONTRADICTED);
         }
@@ -129,15 +136,15 @@ PVID_COLD bool pvid_standing_take(pvid_standing_judge *self, const pvid_standing
     return trusted;
 }
 
-/* A start is due although the gate has not opened. Not while the standard errors only wait for more windows, and not
- * before the first publication: nothing but the start is known there, and an equation's own error is being learned. */
+/* A start is due although the gate has not opened. Not while the standard errors only wait for more windows, not of an
+ * estimate that is merely old, and not before the first publication: nothing but the start is known there, and an
+ * equation's own error is being learned. */
 static bool is_lost(const pvid_standing_judge *self, bool solved)
 {
     const bool mute = self->silent >= PATIENCE;
     const bool away = !solved || (self->fits == 0u);
     const bool wrong = (self->starts > 0u) && (self->windows >= (2u * PATIENCE));
-    const bool unsure =
-        (self->now.state == (uint8_t)PVID_STANDING_DOUBTED) || (self->now.state == (uint8_t)PVID_STANDING_WITHDRAWN);
+    const bool unsure = (self->now.causes & ~(uint32_t)PVID_DOUBT_AGED) != 0u;
     return unsure && (self->starts < STARTS) && ((mute && (self->misfit || away)) || (wrong && self->misfit));
 }
 

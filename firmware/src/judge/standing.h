@@ -24,11 +24,13 @@ typedef struct {
     bool judges;      /* there is a limit of misfit */
     bool errs;        /* the residuals were taken for a larger error of an equation than the design's */
     uint16_t freedom; /* rows less nuisances */
+    uint16_t age_max; /* of the configuration */
     uint32_t ratio;   /* residual variance over its expectation, Q16, at most PVID_STANDING_CLIP */
 } pvid_standing_window;
 
-/* A window that is not used: all of its rows were rejected by the gate, or it was dropped. */
-void pvid_standing_skip(pvid_standing_judge *self, bool rejected);
+/* A window that is not used: all of its rows were rejected by the gate, or it was dropped. age_max: windows; 0: none.
+ */
+void pvid_standing_skip(pvid_standing_judge *self, bool rejected, uint16_t age_max);
 
 /* Behind a window that is used, and was compared (contradicts, grew). Returns whether p is trusted as a start: eight
  * valid publications in a row. */

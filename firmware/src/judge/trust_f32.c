@@ -25,6 +25,7 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .misfit_max = 4.0f,
     .groups_min = 3,
     .revert_after = 16,
+    .age_max = 1000,
     .renewal = 0.2f,
     .shared = NULL,
 };
@@ -351,7 +352,7 @@ PVID_COLD void pvid_trust_open_f32(pvid_trust_f32 *self)
 
 PVID_COLD void pvid_trust_skip_f32(pvid_trust_f32 *self, bool rejected)
 {
-    pvid_standing_skip(&self->standing, rejected);
+    pvid_standing_skip(&self->standing, rejected, self->config.age_max);
     share_standing(self);
 }
 
@@ -380,6 +381,7 @@ PVID_COLD void pvid_trust_stand_f32(pvid_trust_f32 *self, pvid_reason verdict, p
     window.arrived = self->arrived;
     window.judges = self->config.misfit_max > 0.0f;
     window.freedom = freedom;
+    window.age_max = self->config.age_max;
     window.errs = errs;
     window.ratio = PVID_STANDING_CLIP; /* NaN too */
     if (variance_ratio < (float)(PVID_STANDING_CLIP >> 16u)) {
@@ -443,6 +445,7 @@ uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *
     running = pvid_fingerprint_float(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
     running = pvid_fnv_word(running, config->revert_after);
+    running = pvid_fnv_word(running, config->age_max);
     running = pvid_fingerprint_float(running, config->renewal);
     return pvid_fingerprint_floats(running, config->shared, (config->shared != NULL) ? ((n_p * (n_p + 1u)) / 2u) : 0u);
 }

@@ -37,6 +37,7 @@ const pvid_trust_config_q31 pvid_trust_defaults_q31 = {
     .misfit_max = 262144, /* 4 */
     .groups_min = 3,
     .revert_after = 16,
+    .age_max = 1000,
     .renewal = 13107, /* 20 % */
     .shared = NULL,
 };
@@ -365,7 +366,7 @@ void pvid_trust_open_q31(pvid_trust_q31 *self)
 
 void pvid_trust_skip_q31(pvid_trust_q31 *self, bool rejected)
 {
-    pvid_standing_skip(&self->standing, rejected);
+    pvid_standing_skip(&self->standing, rejected, self->config.age_max);
     share_standing(self);
 }
 
@@ -398,6 +399,7 @@ PVID_COLD void pvid_trust_stand_q31(pvid_trust_q31 *self, pvid_reason judged, pv
     window.arrived = self->arrived;
     window.judges = self->config.misfit_max > 0u;
     window.freedom = freedom;
+    window.age_max = self->config.age_max;
     window.errs = errs;
     window.ratio = (uint32_t)pvid_round_shift_q31((ratio > 0) ? ratio : 0, PVID_VARIANCE_RATIO_BITS - 16u);
     if (pvid_standing_take(&self->standing, &window)) {
@@ -458,6 +460,7 @@ uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *
     running = pvid_fnv_word(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
     running = pvid_fnv_word(running, config->revert_after);
+    running = pvid_fnv_word(running, config->age_max);
     running = pvid_fnv_word(running, config->renewal);
     return pvid_fingerprint_words(running, config->shared, (config->shared != NULL) ? ((n_p * (n_p + 1u)) / 2u) : 0u);
 }

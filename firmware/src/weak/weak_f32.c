@@ -143,6 +143,21 @@ PVID_COLD static void restart(pvid_weak_f32 *self)
     choose_task(self);
 }
 
+/* A restart by which samples are lost: as many as a window has new ones age the estimate as a window does that is
+ * dropped. */
+PVID_COLD static void lose(pvid_weak_f32 *self)
+{
+    const uint32_t hop = self->design->hop;
+    const uint32_t decimation = self->design->decimation;
+    const uint32_t halves = (self->sums.halves < 2u) ? self->sums.halves : 0u;
+    self->lost += (((halves * hop) + self->sums.index) * decimation) + 1u;
+    restart(self);
+    if (self->lost >= (hop * decimation)) {
+        self->lost = 0;
+        pvid_trust_skip_f32(&self->trust, false);
+    }
+}
+
 static pvid_status init_refinement(pvid_weak_f32 *self, const pvid_weak_refine_f32 *refine)
 {
     if (refine == NULL) {
@@ -245,7 +260,7 @@ pvid_status pvid_weak_init_layout_f32(pvid_weak_f32 *self, const pvid_weak_confi
 void pvid_weak_gap_f32(pvid_weak_f32 *self)
 {
     if (is_ready(self)) {
-        restart(self);
+        lose(self);
         if (refines(self)) {
             self->refine->refiner->gap(self->refine->storage);
         }
@@ -320,7 +335,7 @@ PVID_NOINLINE static pvid_reason form_channels(pvid_weak_f32 *self)
 /* A sample that is not finite. */
 PVID_COLD static pvid_reason reject(pvid_weak_f32 *self)
 {
-    restart(self);
+    lose(self);
     pvid_count_up(&self->estimator.counters.rejected_not_finite);
     return PVID_REJECTED_NOT_FINITE;
 }

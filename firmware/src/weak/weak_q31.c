@@ -48,6 +48,21 @@ static void restart(pvid_weak_q31 *self)
     choose_task(self);
 }
 
+/* A restart by which samples are lost: as many as a window has new ones age the estimate as a window does that is
+ * dropped. */
+PVID_COLD static void lose(pvid_weak_q31 *self)
+{
+    const uint32_t hop = self->design->hop;
+    const uint32_t decimation = self->design->decimation;
+    const uint32_t halves = (self->accumulator.sums.halves < 2u) ? self->accumulator.sums.halves : 0u;
+    self->lost += (((halves * hop) + self->accumulator.values.index) * decimation) + 1u;
+    restart(self);
+    if (self->lost >= (hop * decimation)) {
+        self->lost = 0;
+        pvid_trust_skip_q31(&self->trust, false);
+    }
+}
+
 /* Whether the sums of a window are read before others take their place. */
 static bool window_fits(const pvid_weak_q31 *self)
 {
@@ -175,7 +190,7 @@ static pvid_reason hand_over(pvid_weak_q31 *self)
 
 PVID_NOINLINE static pvid_reason reject(pvid_weak_q31 *self)
 {
-    restart(self);
+    lose(self);
     pvid_count_up(&self->estimator.counters.rejected_saturated);
     return PVID_REJECTED_SATURATED;
 }
@@ -288,7 +303,7 @@ bool pvid_weak_read_q31(const pvid_weak_q31 *self, pvid_estimate_q31 *estimate, 
 void pvid_weak_gap_q31(pvid_weak_q31 *self)
 {
     if (is_ready(self)) {
-        restart(self);
+        lose(self);
     }
 }
 

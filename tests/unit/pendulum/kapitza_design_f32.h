@@ -164,6 +164,7 @@ static const pvid_weak_config_f32 kapitza_config_f32 = {
         .misfit_max = 4.0f,
         .groups_min = 3,
         .revert_after = 16,
+        .age_max = 1000,
         .renewal = 0.200000003f,
         .shared = kapitza_shared,
     },

@@ -202,7 +202,7 @@ static const pvid_weak_config_q31 kapitza_config_q31 = {
         .dead_zone = 0,
         .divider = 1,
     },
-    .trust = {.kappa_min = 32212, .se_max = 838861, .misfit_max = 262144, .groups_min = 3, .revert_after = 16, .renewal = 13107, .shared = kapitza_shared_q31},
+    .trust = {.kappa_min = 32212, .se_max = 838861, .misfit_max = 262144, .groups_min = 3, .revert_after = 16, .age_max = 1000, .renewal = 13107, .shared = kapitza_shared_q31},
     .gate = {.sigmas = 262144, .patience_groups = 100},
 };
 

@@ -356,7 +356,7 @@ def _config(compiled: CompiledModel, settings: Mapping[str, Any]) -> WeakConfig:
     made = WeakDesign32(
         model=weak_model_of(compiled), filter=filters, compensator=compensators, noise=noise, **arrays(design)
     )
-    estimator, trust = arrays(part("estimator")), arrays(part("trust"))
+    estimator, trust = arrays(part("estimator")), {"age_max": 0} | arrays(part("trust"))  # 0: of former logs
     if "neglected" in trust:
         trust["shared"] = Shared.of_part(compiled, trust.pop("neglected")).triangle
     own = {one.name: settings[one.name] for one in fields(WeakConfig) if one.name in settings}

@@ -234,7 +234,7 @@ class MechanismBoardQ31:
         highest = design["functions"] // 2 + design["power"] // 2
         circle = circle_of(design["hop"], highest, design["fine"])
         tables = WeakDesignQ31(model=made.model, circle=circle, units=(), margins={}, **design)
-        trust = part("trust")
+        trust = {"age_max": 0} | part("trust")  # 0: of former logs
         part_of_all = trust.pop("neglected", 0) / 2**30  # of logs before there were other shared errors
         config = WeakConfigQ31(
             design=tables,

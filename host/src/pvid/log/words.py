@@ -43,6 +43,7 @@ _DOUBTS = {
     Doubt.MISFIT: "residuals exceed the sensors' noise",
     Doubt.REJECTS: "many windows are rejected as outliers",
     Doubt.CHANGED: "the mechanism has changed",
+    Doubt.AGED: "nothing has confirmed it for long",
 }
 
 

@@ -120,6 +120,7 @@ class Doubt(_Named):
     MISFIT = 4
     REJECTS = 8
     CHANGED = 16
+    AGED = 32
 
 
 class Law(_Named):

@@ -42,6 +42,7 @@ class TrustConfig:
     misfit_max: float = 4.0
     groups_min: int = 3
     revert_after: int = 16
+    age_max: int = 1000
     renewal: float = 0.2
     shared: npt.NDArray[np.float32] | None = None
 
@@ -86,6 +87,7 @@ class TrustConfigQ31:
     misfit_max: int = 262144
     groups_min: int = 3
     revert_after: int = 16
+    age_max: int = 1000
     renewal: int = 13107
     shared: tuple[int, ...] | None = None
 
