@@ -189,3 +189,51 @@ def test_an_answer_without_a_value_or_of_another_mechanism_is_refused(tmp_path: 
     (tmp_path / "a.json").write_text(json.dumps(answer), encoding="utf-8")
     with pytest.raises(PvidError, match="L of dc_motor has no value there"):
         CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
+
+
+def process_of_one_step(seed: int, slow_noise: float) -> tuple[CompiledModel, Recording]:
+    """A process of first order, 66 s slow, sampled at 10 Hz for 430 s, whose input steps once; the surface moves."""
+    rng, rate, count = np.random.default_rng(seed), 10.0, 4300
+    model = Model("level")
+    u = model.input("u", "V", hold="zoh", reach=10)
+    h = model.sensor("h", "m", resolution=1e-4, reach=1)
+    K, T = model.unknown("K", "m/V", 3.0), model.unknown("T", "s", 50.0)
+    h0 = model.unknown("h0", "m", -10.0, positive=False, sd=10)
+    model.equation(T * h.d() + h - K * u - h0)
+    drive = np.where(np.arange(count) < 60, 5.0, 5.5)
+    level = lfilter([0.0, -np.expm1(-1 / (rate * 66.0))], [1.0, -np.exp(-1 / (rate * 66.0))], 4.5 * (drive - 5.0)) + 2.0
+    waves = lfilter([1.0], [1.0, -0.9], rng.normal(size=count)) * slow_noise
+    read = np.round((level + waves) / 2e-3) * 2e-3
+    return model.compiled("level"), Recording(np.arange(count) / rate, {"h": read, "u": drive}, rate)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_one_step_of_a_slow_process_gives_its_time_constant(seed: int) -> None:
+    model, run = process_of_one_step(seed, 0.03)
+    T = identified(run, model).values["T"]
+    assert T.value is not None and T.se is not None
+    assert abs(T.value - 66.0) < min(3 * T.se, 0.2 * 66.0)  # windows of 5 s show 0.3 s
+
+
+def pushed_pendulum(seed: int, size: float) -> Recording:
+    """A pendulum without dry friction, pushed by something slow that nobody recorded."""
+    rng, rate, count = np.random.default_rng(seed), 500.0, 2500
+    push, step, q, v, read = lfilter([0.02], [1, -0.98], rng.normal(size=count)) * size, 1 / 2000.0, -2.3, -3.0, []
+    for now in push:
+        read.append(q)
+        for _ in range(4):
+            v += step * (now - 120 * np.sin(q) - 0.4 * v)
+            q += step * v
+    return Recording(np.arange(count) / rate, {"q": np.round(np.array(read) / 1.6e-3) * 1.6e-3}, rate)
+
+
+@pytest.mark.parametrize("size", [20.0, 60.0])
+def test_a_search_that_ran_to_0_does_not_withhold_what_predicts_the_motion(size: float) -> None:
+    usual = analysed(pushed_pendulum(2, size), compiled_of("free_pendulum"))
+    answer = judged(usual)
+    assert not usual.found.fit.settled and not usual.identified
+    w2 = answer.values["w2"]
+    assert answer.status == "warning" and all(one.r2 > 0.99 for one in answer.prediction)
+    assert w2.value is not None and w2.se is not None and abs(w2.value - 120.0) < 3 * w2.se < 0.1 * 120.0
+    assert answer.values["c"].value is None
+    assert {"not_settled", "undetermined"} <= {one.name for one in answer.verdict.reasons}

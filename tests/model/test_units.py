@@ -7,6 +7,7 @@ from sympy.physics import units as si
 from pvid.base.errors import PvidError
 from pvid.base.units import BASE, unit_of
 from pvid.model import Model, cos, sin
+from pvid.model.refusal import ModelError
 from pvid.model.units import dimension_of_unit
 
 FINE = 1e-4
@@ -108,6 +109,9 @@ def test_a_unit_does_not_end_a_comment_of_c(text: str) -> None:
 
 
 def test_powers_are_fractions_too() -> None:
+    assert dimension_of_unit("m^0.5/s^1.5") == dimension_of_unit("m^(1/2)/s^(3/2)") != dimension_of_unit("m^0/s^1")
+    with pytest.raises(ModelError, match=r'equations are in SI, use "m\^\(1/2\)\*s\^-1"'):
+        dimension_of_unit("cm^0.5/s")
     assert dimension_of_unit("m^(5/2)/s") * dimension_of_unit("1/m^(1/2)") == dimension_of_unit("m^2/s")
     assert dimension_of_unit("V/(A^2*s)") == dimension_of_unit("V/A^2/s") == dimension_of_unit("V A^-2 s^-1")
     assert dimension_of_unit("V/(A*s)^2") == dimension_of_unit("V/(A^2*s^2)") == dimension_of_unit("V/A^2/s^2")

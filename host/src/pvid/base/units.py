@@ -118,7 +118,7 @@ _WORDS = {
 _SYMBOL_OF = {word: symbol for symbol, words in _WORDS.items() for word in words.split()}
 _SIGNS = ("*", "/", " ", ".")
 _NAME = re.compile(r"[A-Za-z_%]+|1(?!\d)")
-_POWER = re.compile(r"\^?([+-]?\d+)|\^\(([+-]?\d+/[1-9]\d*)\)")
+_POWER = re.compile(r"\^([+-]?\d*\.\d+)|\^?([+-]?\d+)|\^\(([+-]?\d+/[1-9]\d*)\)")
 # Of a signal in an SI unit, what a refusal proposes.
 _USUAL = {
     "s": ("s", "ms", "us", "ns", "min", "h", "d"),
@@ -218,7 +218,7 @@ def _factor(text: str, at: int) -> tuple[Unit, int] | None:
     if one is None:
         return None
     power = _POWER.match(text, end)
-    return (one, end) if power is None else (_ONE.times(one, Fraction(power[1] or power[2])), power.end())
+    return (one, end) if power is None else (_ONE.times(one, Fraction(power[1] or power[2] or power[3])), power.end())
 
 
 def _symbol(text: str) -> Unit | None:

@@ -46,6 +46,7 @@ _SAMPLES = 3000  # that are simulated of each half
 _ALIKE = 0.1  # difference of the logarithms of the rms up to which estimates predict alike
 _PASSES = 8  # of the refinement
 _MOST = 12_000  # samples that it takes: no more are needed where the equations are what errs
+_MOST_OF_PARTS = 6000  # the same over whole parts of the run
 _OF_ANALYSIS = 0.6  # of the work that is allowed to a search for a design: that of the estimates here
 _SIMULATED = 120  # times that the samples of both halves are simulated with all derivatives, at most
 _NEAR = 4  # passes of a fit that begins at that to all data
@@ -56,10 +57,13 @@ _OF_NOISE = 3.0  # times the sensor's: a smaller error of a prediction is noise
 
 _USUAL = "the usual estimate"
 # Doubts of the usual estimate alone: another has its own, or is one of those that were compared.
+_OF_PARAMETERS = ("not_identified", "undetermined", "near_zero")
 _OF_USUAL = (
-    *("not_identified", "undetermined", "near_zero", "range", "not_settled"),
+    *(*_OF_PARAMETERS, "range", "not_settled"),
     *("halves", "windows", "smoothing", "attenuation", "weights"),
 )
+# In place of what was found at a usual estimate that does not describe the motion.
+_LACKING = "The equations lack something, or a signal is not what was recorded: the cause is unknown."
 _OF_WIDTH = ("wide", "model_error")  # of standard errors that the spread of the estimates is not in
 # Of a window, times the chosen one; words, error of the equations in the weights, compensation.
 _LENGTHS = {1.0: _USUAL, 2.0: "the estimate with windows twice as long", 0.5: "the estimate with windows half as long"}
@@ -171,11 +175,15 @@ def _judged(answer: Analysis) -> Analysis:
     if found:
         best = min(found, key=attrgetter("score"))
         found += trial.estimates(best.name, *designs[best.name], _WEIGHTS[1:])
-        again = trial.refined(min(found, key=attrgetter("score")))
-        found += [] if again is None else [again]
+        best = min(found, key=attrgetter("score"))
+        if not trial.is_spent and any(one.r2 > 0 for one in best.sensors):  # else no motion near the recorded one
+            name = "the fit of the whole equations" + ("" if best.name == _USUAL else f", from {best.name} on")
+            found += trial.refined(best, name, _MOST)
     found = [one for one in found if np.isfinite(one.score)]
     if not found:
         return answer
+    if _poor(min(found, key=attrgetter("score"))):
+        found = trial.over_whole_parts(found)
     best = min(found, key=attrgetter("score"))
     usual = next((one for one in found if one.name == _USUAL), None)
     describes = all(one.r2 > _DESCRIBED for one in best.sensors)
@@ -184,6 +192,11 @@ def _judged(answer: Analysis) -> Analysis:
     chosen = best if usual is None or (describes and best.score < usual.score - _ALIKE) else usual
     alike = [one for one in found if one.score < chosen.score + _ALIKE] if describes else [chosen]
     return _published(answer, chosen, usual, alike)
+
+
+def _poor(one: Candidate) -> list[SensorPrediction]:
+    """Sensors whose motion that was not fitted it does not describe."""
+    return [sensor for sensor in one.sensors if sensor.r2 < PREDICTED]
 
 
 def _designs(answer: Analysis) -> Iterator[tuple[str, WeakDesign, Float]]:
@@ -242,7 +255,7 @@ class _Trial:
         problem.budget.left = _SIMULATED * samples * (1 + problem.kernel.columns)
 
     @property
-    def _is_spent(self) -> bool:
+    def is_spent(self) -> bool:
         return work.is_spent() or self._motion.problem.budget.is_spent
 
     def estimates(
@@ -256,7 +269,7 @@ class _Trial:
             return []
         out = []
         for words, equation_error, compensate in weights:
-            if self._is_spent and not (name == _USUAL and not words):
+            if self.is_spent and not (name == _USUAL and not words):
                 break
             fitted = _Fitted(equation_error, compensate)
             usual = self._answer.found.fit
@@ -319,13 +332,36 @@ class _Trial:
         usual = self._answer.found.fit
         return self._scored(Candidate(_USUAL, p, np.sqrt(np.diag(covariance)), (halves[0], halves[1]), usual))
 
-    def refined(self, best: Candidate) -> Candidate | None:
-        """The refinement from an estimate on: it is weighted by what that reaches, not by the sensors' noise."""
+    def over_whole_parts(self, found: Sequence[Candidate]) -> list[Candidate]:
+        """The same, scored over blocks as long as a part of the run, with the refinement of the best of them, or else
+        of the guesses, over such blocks: a process that is slow beside the windows, or a recording of one step, shows
+        its parameters there alone."""
+        recording = self._answer.recording
+        self._block = max(self._block, self._motion.block(len(recording) / recording.sample_rate, _PARTS))
+        again = [self._scored(replace(one, score=np.inf)) for one in found]
+        again = [one for one in again if np.isfinite(one.score)]
+        if not again:
+            return list(found)
+        best = min(again, key=attrgetter("score"))
+        p = np.array([one.guess for one in self._answer.model.unknowns])
+        guesses = replace(best, p=p, halves=(self._motion.r_of(p),) * 2, score=np.inf)
+        for start, named in ((best, ""), (guesses, ", from the guesses on")):
+            if _poor(min(again, key=attrgetter("score"))):
+                name = f"the fit of the whole equations over blocks of {self._seconds:.2g} s{named}"
+                again += self.refined(self._scored(start), name, _MOST_OF_PARTS)
+        return again
+
+    @property
+    def _seconds(self) -> float:
+        """Of a block."""
+        return self._block / self._motion.problem.measured.rate
+
+    def refined(self, best: Candidate, name: str, most: int) -> list[Candidate]:
+        """The refinement from an estimate on, of about so many samples at most, scored: it is weighted by what that
+        reaches, not by the sensors' noise. None where it has no outcome."""
         motion, samples = self._motion, self._block
-        if self._answer.model.constraints:  # which it does not keep
-            return None
-        if self._is_spent or not any(one.r2 > 0 for one in best.sensors):  # no motion near the recorded one
-            return None
+        if self._answer.model.constraints or not best.sensors or motion.problem.budget.is_spent:  # it keeps none
+            return []
         sd = np.maximum(motion.sd, [one.rms for one in best.sensors])
 
         def searched(problem: Problem, r: Float) -> Refined:
@@ -333,19 +369,19 @@ class _Trial:
 
         try:
             whole = searched(
-                motion.within(self._thinned(self._parts[0] + self._parts[1], _MOST), sd), motion.r_of(best.p)
+                motion.within(self._thinned(self._parts[0] + self._parts[1], most), sd), motion.r_of(best.p)
             )
             first, second = (
-                searched(motion.within(self._thinned(part, _MOST // 2), sd), r).r
+                searched(motion.within(self._thinned(part, most // 2), sd), r).r
                 for part, r in zip(self._parts, best.halves, strict=True)
             )
         except FAILURES:
-            return None
+            return []
         p, covariance = motion.problem.values(whole, motion.problem.kernel.made.places_of_p)
         if not np.isfinite(covariance).all():
-            return None
-        name = "the fit of the whole equations" + ("" if best.name == _USUAL else f", from {best.name} on")
-        return self._scored(Candidate(name, p, np.sqrt(np.diag(covariance)), (first, second), best.fit))
+            return []
+        one = self._scored(Candidate(name, p, np.sqrt(np.diag(covariance)), (first, second), best.fit))
+        return [one] if np.isfinite(one.score) else []
 
     def _thinned(self, parts: Sequence[Stretch], most: int) -> list[Stretch]:
         """Pieces of the parts with at most about so many samples together, evenly spread."""
@@ -387,20 +423,23 @@ def _published(answer: Analysis, chosen: Candidate, usual: Candidate | None, ali
     by_model = np.max(np.abs(shifts), axis=0)
     noise = found.noise if chosen is usual else chosen.se
     se = np.sqrt(noise**2 + np.sum(found.gains**2, axis=0) + by_model**2)
-    status = tuple(verdict.judged(model, fit, noise))
+    poor = _poor(chosen)
+    settled = fit.settled or not poor  # a search that did not come to rest may predict the motion all the same
+    again = chosen is not usual or (settled and not fit.settled)
+    found_of = verdict.judged(model, fit, noise)
+    status = tuple(found_of if settled or again else verdict.with_unsettled(fit, found_of))
     r2 = list(found.r2.values()) if chosen is usual else uncertainty(fit).r2
-    own = (*_OF_WIDTH, *(() if chosen is usual else _OF_USUAL))
+    own = (*_OF_WIDTH, *(_OF_USUAL if chosen is not usual else _OF_PARAMETERS if again else ()))
     reasons = [one for one in found.verdict.reasons if one.name not in own]
-    poor = [one for one in chosen.sensors if one.r2 < PREDICTED]
+    if chosen is not usual and (usual is None or any(one.r2 < _DESCRIBED for one in usual.sensors)):
+        reasons = [replace(one, text=_LACKING) if one.name == "unexplained" else one for one in reasons]
     if not poor:  # the cause is unknown, but the values are those that move the mechanism
         reasons = [replace(one, name="missing") if one.name == "unexplained" else one for one in reasons]
     reasons += verdict.of_width(model, fit, se, by_model, status)
+    if again:
+        reasons += verdict.of_parameters(model, fit, noise, status, r2)
     if chosen is not usual:
-        reasons += [
-            *verdict.of_parameters(model, fit, noise, status, r2),
-            *verdict.of_range(model, chosen.p, status),
-            _of_choice(chosen, usual),
-        ]
+        reasons += [*verdict.of_range(model, chosen.p, status), _of_choice(chosen, usual)]
     if not poor and (worse := _poorly_predicted(chosen)):
         text = f"The answer predicts {listed(worse)}: did something change, or does a parameter differ there (--own)?"
         reasons.append(Reason("unpredicted", text))

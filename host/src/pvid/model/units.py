@@ -41,7 +41,7 @@ class Dimension:
     def in_base_units(self) -> str:
         """As in "kg*m^2*s^-2"."""
         named = [(name, one) for name, one in zip(_BASE_NAMES, self.of, strict=True) if one != 0]
-        return "*".join(name if one == 1 else f"{name}^{one}" for name, one in named) or "1"
+        return "*".join(_power(name, one) for name, one in named) or "1"
 
     @property
     def unit(self) -> str:
@@ -54,7 +54,8 @@ class Dimension:
 
 
 def _power(name: str, exponent: sp.Rational) -> str:
-    return name if exponent == 1 else f"{name}^{exponent}"
+    text = f"{exponent}" if exponent.is_Integer else f"({exponent})"
+    return name if exponent == 1 else f"{name}^{text}"
 
 
 NUMBER = Dimension()
