@@ -104,6 +104,18 @@ def test_error_codes_of_a_current_are_interpolated_though_it_has_corners(code: f
     assert cleaned.notes[0].split("samples of i")[1].startswith(f" are far from those about it ({code:g} A in ")
 
 
+def test_peaks_of_a_current_that_is_faster_than_its_samples_are_no_error_codes() -> None:
+    """Some samples behind each step of the voltage; of few levels they have the same height time and again."""
+    recording, model = recorded("dc_motor"), compiled_of("dc_motor")
+    voltage = np.repeat(np.random.default_rng(4).choice([-6.0, 6.0], len(recording) // 20), 20)
+    current, speed = np.zeros(len(voltage)), 0.0
+    for k in range(1, len(voltage)):
+        current[k] = current[k - 1] + 0.6 * (voltage[k - 1] - speed - current[k - 1])
+        speed += 0.37 * current[k]
+    signals = {"V": voltage, "i": np.round(current, 1), "phi": recording.signals["phi"][: len(voltage)]}
+    assert without_wild_samples(Recording(recording.t[: len(voltage)], signals, 1000.0), model).notes == ()
+
+
 @pytest.mark.parametrize("code", [-9999.0, 65535.0])
 @pytest.mark.parametrize("name", ["dc_motor", "battery_2rc", "rigid_body"])
 def test_error_codes_of_any_signal_are_interpolated(name: str, code: float) -> None:

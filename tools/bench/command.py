@@ -48,6 +48,20 @@ CASES = (
         ),
     ),
     Case(
+        "strong",
+        "The strong form in C beside the weak form, with finer and finer encoders.",
+        "strong",
+        options=_number("--seeds", 80),
+        rows=(("strong-sensors", "HEADER", "rows"),),
+    ),
+    Case(
+        "starts",
+        "From how far off both forms in C converge.",
+        "strong",
+        options=_number("--starts", 40, "Of each factor."),
+        rows=(("starts", "RADIUS_HEADER", "radius_rows"),),
+    ),
+    Case(
         "refine-mechanisms",
         "Both stages in C: errors beside the Cramer-Rao bound.",
         "refine_mechanisms",

@@ -27,8 +27,9 @@ _MOST = 1e-3  # of the samples: where more are, they belong to the signal
 # or twice the usual motion; in runs of a few, with neighbours that are off by a small part of that.
 _MEDIAN_OF, _FAR, _RUN, _NEIGHBOUR = 11, 10.0, 3, 0.2
 # An error code: so many samples in a row, so often where both neighbours agree, while no input moves by so much of its
-# range.
-_CODES, _FEWEST_CODES, _STEADY = 8, 4, 0.05
+# range, nor did a few samples before: a fast current has its peak that long after a step of the voltage. Off by few
+# steps of the sensor's resolution is no code.
+_CODES, _FEWEST_CODES, _STEADY, _LATER, _STEPS = 8, 4, 0.05, 3, 4
 # One or two values that no motion reaches: so many spans of eight of ten samples away from them, time and again, not in
 # the long runs of a pulse.
 _SPANS, _MOST_VALUES, _TENTH = 10.0, 2, 0.1
@@ -62,7 +63,10 @@ def _error_codes(x: Float, sd: float, steady: Mask) -> Mask:
     peak of fast oscillations is off by less than the usual motion from sample to sample."""
     far = np.zeros(len(x), np.bool_)
     moves = np.abs(np.diff(x))
-    limit = max(2 * _FAR * sd, 2 * float(np.nanmedian(moves)) if np.isfinite(moves).any() else 0.0)
+    step = float(np.min(moves[moves > 0], initial=np.inf))
+    if not np.isfinite(step):
+        return far
+    limit = max(2 * _FAR * sd, _STEPS * step, 2 * float(np.nanmedian(moves)))
     for run in range(1, _CODES + 1):
         first = np.arange(1, len(x) - run)
         inside = np.array([x[first + k] for k in range(run)])
@@ -115,13 +119,13 @@ def _alone(x: Float, others: Sequence[Float]) -> Mask:
 
 
 def _steady(recording: Recording, model: CompiledModel) -> Mask:
-    """Samples before which no input moves by much."""
-    steady = np.ones(len(recording), np.bool_)
+    """Samples shortly before which no input moves by much."""
+    moved = np.zeros(len(recording), np.bool_)
     for one in model.signals:
         if one.driven or one.kind == "input":
             u = recording.signals[one.name]
-            steady[1:] &= ~(np.abs(np.diff(u)) > _STEADY * (np.nanmax(u) - np.nanmin(u)))
-    return steady
+            moved[1:] |= np.abs(np.diff(u)) > _STEADY * (np.nanmax(u) - np.nanmin(u))
+    return np.convolve(moved, np.ones(1 + _LATER))[: len(moved)] == 0
 
 
 def _without_far_samples(recording: Recording, signal: Signal, find: Callable[[Float], Mask]) -> tuple[Float, str]:

@@ -27,8 +27,8 @@ from pvid.oracle.weak.terms import Candidate, Change
 
 FOLDS = 4  # contiguous parts of each recording: p and sizes from three, the share on the fourth
 
-# A column of which the parameters explain all but this part is theirs: no data show it.
-_OWN = 1e-4
+# A column of which the parameters, or one of them, explain all but this part is theirs: no data show it.
+_OWN, _OF_ONE = 1e-4, 1e-3
 
 # What replaces a signal as a whole has a column of size 1.
 _WHOLE = (0.4, 2.5)
@@ -219,7 +219,9 @@ class Scores:
         mix, step = self.inverse @ jc.sum(axis=0), self.inverse @ jr.sum(axis=0)
         own = cc.sum(axis=0) - np.einsum("pc,pc->c", jc.sum(axis=0), mix)
         part_of_its_own = own / np.maximum(cc.sum(axis=0), 1e-300)
-        real = part_of_its_own > _OWN
+        sizes = np.sqrt(np.maximum(np.einsum("dpp->p", jj)[:, np.newaxis] * cc.sum(axis=0), 1e-300))
+        beside_each = 1 - np.max(np.abs(jc.sum(axis=0)) / sizes, axis=0, initial=0.0) ** 2
+        real = (part_of_its_own > _OWN) & (beside_each > _OF_ONE)
         own = np.where(real, own, 1.0)
         size = np.where(real, (cr.sum(axis=0) - jr.sum(axis=0) @ mix) / own, 0.0)
         squared = each_jj.reshape(len(r), -1) @ (mix[:, np.newaxis] * mix).reshape(-1, len(candidates))

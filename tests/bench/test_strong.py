@@ -1,0 +1,41 @@
+"""The bench of the strong form beside the weak form: its short forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bench import strong
+from pvid.sim.simulated_run import simulation_of
+
+
+def test_a_finer_encoder_helps_the_strong_form_and_the_weak_form_is_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strong, "FINER", (1, 64))
+    counted: list[int] = []
+    coarse, fine = [
+        dict(zip(strong.HEADER, row, strict=True)) for row in strong.rows(["ring_down"], 3, lambda: counted.append(1))
+    ]
+    assert len(counted) == 6
+    assert float(fine["RMS %: strong"]) < float(coarse["RMS %: strong"]) / 10
+    assert float(coarse["strong over weak: median"]) > 2 and float(fine["strong over weak: median"]) > 1
+
+
+def test_only_what_is_differentiated_twice_becomes_finer() -> None:
+    motor = simulation_of("dc_motor")
+    before, after = (
+        {one.name: one.resolution for one in model.signals}
+        for model in (motor.model, strong.with_finer_sensors(motor, 4).model)
+    )
+    assert after == {**before, "phi": before["phi"] / 4}
+    lag = strong.with_finer_sensors(simulation_of("cooling"), 2).model  # of the first order: every sensor
+    assert all(one.resolution == 0.0625 / 2 for one in lag.signals)
+
+
+def test_starts_are_a_factor_off_and_the_forms_converge_from_twice_the_truth() -> None:
+    kapitza = simulation_of("kapitza")
+    off = strong.starts(kapitza, 2.0, 5)[:, :3] / kapitza.truth[:3]  # the others may have either sign
+    assert np.allclose(np.abs(np.log(off)), np.log(2.0))
+    found = list(strong.radius_rows(["kapitza"], 3, lambda: None))
+    assert [row[:3] for row in found] == [("kapitza", "weak", "3"), ("kapitza", "strong", "3")]
+    assert all(row[4:7] == ("100 %",) * 3 for row in found)
+    assert all(len(row) == len(strong.RADIUS_HEADER) for row in found)
