@@ -106,7 +106,7 @@ def hello(session: int = 7, **values: Any) -> link.Hello:
         "sample_rate": board().sample_rate,
         "phi_lsb": sensors.phi_lsb,
         "y_lsb": sensors.y_lsb,
-        "p_unit": (*[1.0] * n_p, *[0.0] * (link.MAX_P - n_p)),
+        "p_unit": (*[1.0] * n_p, *[0.0] * (link.PLACES - n_p)),
         "board": "field",
     }
     return link.Hello(**{**said, **values})

@@ -17,7 +17,7 @@ from pvid.board.stream_image import settings_number
 from pvid.codegen.weak_library import weak_native
 from pvid.link import frames as link
 from pvid.link.frames import (
-    MAX_P,
+    PLACES,
     SCHEMA,
     SCHEMA_TEXT,
     Code,
@@ -70,13 +70,12 @@ Step = bytes | Pause | HangUp | Flood
 
 def message(kind: type[Kind], **values: Any) -> Kind:
     """A message of these values; 0, no text and no bytes where a field is not named."""
-    for one in fields(kind):
-        if one.name == "samples" and one.name not in values:
-            values[one.name] = 2
-        if one.name not in values:
-            count, of = one.metadata["count"], one.metadata["kind"]
+    for name, of, count in kind.layout().fields:
+        if name == "samples" and name not in values:
+            values[name] = 2
+        if name not in values:
             zero: Any = 0.0 if of == "f32" else 0
-            values[one.name] = b"" if count is None else "" if of == "char" else zero if count == 1 else (zero,) * count
+            values[name] = b"" if count is None else "" if of == "char" else zero if count == 1 else (zero,) * count
     return kind(**values)
 
 
@@ -118,7 +117,7 @@ def estimate_of(own: Any, frame: type[Kind], **values: Any) -> Kind:
 
 def padded(row: Any) -> tuple[Any, ...]:
     """As many numbers as a frame has."""
-    return tuple(np.resize(np.append(row, np.zeros(MAX_P, np.asarray(row).dtype)), MAX_P).tolist())
+    return tuple(np.resize(np.append(row, np.zeros(PLACES, np.asarray(row).dtype)), PLACES).tolist())
 
 
 @cache
@@ -188,7 +187,7 @@ class LyingBoard:
             "sample_rate": own.sample_rate,
             "phi_lsb": board().compiled.signal("phi").resolution,
             "y_lsb": board().compiled.signal("y").resolution,
-            "p_unit": (*[1.0] * n_p, *[0.0] * (MAX_P - n_p)),
+            "p_unit": (*[1.0] * n_p, *[0.0] * (PLACES - n_p)),
             "board": "liar",
             "samples": 2,
         }
@@ -208,7 +207,7 @@ class LyingBoard:
         plausible = {
             "session": SESSION,
             "updates": 5,
-            "p": (31.0, 8.8, 5.6, *[0.0] * (MAX_P - 3)),
+            "p": (31.0, 8.8, 5.6, *[0.0] * (PLACES - 3)),
             "covariance": (1e-6,) * len(link.upper_triangle([[0.0]])),
             "kappa": 0.01,
             "residual_sd": 1e-4,

@@ -1,4 +1,5 @@
-"""Mechanisms in files of one's own, with a recording of each: one without an input, one that is no motion."""
+"""Mechanisms in files of one's own, with a recording of each: one without an input, one that is no motion, one with as
+many unknowns as the core takes."""
 
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -42,6 +43,7 @@ OWN = {
         ROOT / "tests" / "data" / "recordings" / "free_pendulum.py", 500.0, (0.1, 1.0), {"q": 2.5}
     ),
     "heated_plate": OwnMechanism(Path(__file__).with_name("heated_plate.py"), 10.0, (0.005, 0.1)),
+    "mass_chain": OwnMechanism(Path(__file__).with_name("mass_chain.py"), 200.0, (0.2, 5.0)),
 }
 
 

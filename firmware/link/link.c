@@ -116,7 +116,11 @@ static bool accept(pvid_link_decoder *self, pvid_link_frame *frame)
         count(&self->counters.bad_crc, 1u);
         return false;
     }
-    if ((self->raw[0] != PVID_LINK_VERSION) || (pvid_get_u32(&self->raw[2]) != PVID_LINK_SCHEMA)) {
+    bool known = (self->raw[0] == PVID_LINK_VERSION) && (pvid_get_u32(&self->raw[2]) == PVID_LINK_SCHEMA);
+#if PVID_MAX_P > 8 /* frames without parameters are the same in both */
+    known = known || ((self->raw[0] == PVID_LINK_VERSION) && (pvid_get_u32(&self->raw[2]) == PVID_LINK_NARROW_SCHEMA));
+#endif
+    if (!known) {
         count(&self->counters.foreign, 1u);
         return false;
     }

@@ -1,4 +1,4 @@
-"""Boards of four kinds of mechanism: two shipped ones, one without an input and one in a file of the user's own."""
+"""Boards of five kinds of mechanism: two shipped ones, one without an input and two in files of the user's own."""
 
 from dataclasses import replace
 from functools import cache
@@ -22,6 +22,7 @@ BOARDS = {
     "kapitza": MechanismBoardQ31,
     "free_pendulum": MechanismBoard,
     "heated_plate": MechanismBoardQ31,
+    "mass_chain": MechanismBoard,
 }
 
 

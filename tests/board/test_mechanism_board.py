@@ -104,14 +104,20 @@ def test_text_that_is_damaged_is_refused(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "target"),
-    [*((one, HOST_TARGET) for one in BOARDS), ("free_pendulum", "mps2-an386"), ("heated_plate", "mps2-an386")],
+    ("name", "target", "fixed"),
+    [
+        *((one, HOST_TARGET, kind is MechanismBoardQ31) for one, kind in BOARDS.items()),
+        ("free_pendulum", "mps2-an386", False),
+        ("heated_plate", "mps2-an386", True),
+        ("mass_chain", "mps2-an386", False),
+        ("mass_chain", "mps2-an386", True),
+    ],
 )
-def test_a_board_computes_the_bits_of_this_machine(name: str, target: str) -> None:
-    board = board_of_mechanism(name)
+def test_a_board_computes_the_bits_of_this_machine(name: str, target: str, fixed: bool) -> None:
+    board = board_of_mechanism(name, MechanismBoardQ31 if fixed else MechanismBoard)
     with open_target(target, board) as opened:
         record = collect(opened, TICKS, begin=board, hash_every=600, estimate_every=1200)
-    own, kind = core_record(board), (Core.Q31 if isinstance(board, MechanismBoardQ31) else Core.F32)
+    own, kind = core_record(board), (Core.Q31 if fixed else Core.F32)
     assert record.hello is not None
     assert (record.hello.form, record.hello.core, record.hello.samples) == (Form.WEAK, kind, board.recording.shape[1])
     assert record.status is not None and record.status.code == Code.RUNNING and record.gaps == []

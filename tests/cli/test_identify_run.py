@@ -226,27 +226,27 @@ def test_a_hidden_coordinate_that_cannot_be_removed_is_refused(tmp_path: Path) -
         pvid("model", "check", tmp_path / "hidden.py")
 
 
-NINE = """
+CARTS = """
 from pvid.model import Model
-model = Model("three carts")
+model = Model("six carts")
 F, k, c, m, x = model.input("F", "N", hold="zoh"), [], [], [], []
-for n in range(3):
+for n in range(6):
     x.append(model.sensor(f"x{n}", "m", noise=1e-4))
     m.append(model.unknown(f"m{n}", "kg", 1.0))
     k.append(model.unknown(f"k{n}", "N/m", 50.0))
     c.append(model.unknown(f"c{n}", "N*s/m", 1.0))
-for n in range(3):
-    model.equation(m[n] * x[n].d(2) + c[n] * x[n].d() + k[n] * x[n] - (F if n == 2 else k[n + 1] * x[n + 1]))
+for n in range(6):
+    model.equation(m[n] * x[n].d(2) + c[n] * x[n].d() + k[n] * x[n] - (F if n == 5 else k[n + 1] * x[n + 1]))
 """
 
 
 def test_more_unknowns_than_the_c_core_takes_are_one_sentence(tmp_path: Path) -> None:
     """From every command that needs the core, before it analyses the run; in float64 all are identified."""
     path, run = tmp_path / "carts.py", tmp_path / "carts.csv"
-    path.write_text(NINE, encoding="utf-8")
-    sentence = r"carts has 9 unknowns and the C core takes at most 8: declare some of them as known"
+    path.write_text(CARTS, encoding="utf-8")
+    sentence = r"carts has 18 unknowns and the C core takes at most 16: declare some of them as known"
     found = pvid("model", "check", path)
-    assert re.search(sentence, found.stderr) and "all 9 unknowns" in found.stdout
+    assert re.search(sentence, found.stderr) and "all 18 unknowns" in found.stdout
     assert pvid("model", "simulate", path, run, "--duration", "10").return_value == DONE
     for arguments in (
         ("model", "build", path, "-o", tmp_path / "c"),
@@ -262,7 +262,7 @@ def test_more_unknowns_than_the_c_core_takes_are_one_sentence(tmp_path: Path) ->
             pvid(*given)
     assert not (tmp_path / "c").exists() and not (tmp_path / "d").exists()
     answer = json.loads(pvid("identify", run, "--model", path, "--refine", "--json").stdout)
-    assert answer["identified"] and len(answer["parameters"]) == 9
+    assert answer["identified"] and len(answer["parameters"]) == 18
 
 
 def test_predict_compares_drives() -> None:

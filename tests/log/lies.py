@@ -31,10 +31,12 @@ from lying_board import (
 
 from pvid.link import frames as link
 from pvid.link.frames import (
-    MAX_P,
     MAX_PAYLOAD,
+    PLACES,
     SCHEMA,
     SCHEMA_TEXT,
+    WIDE,
+    WIDE_SCHEMA,
     Configure,
     ConfigureQ31,
     Credit,
@@ -47,6 +49,7 @@ from pvid.link.frames import (
     RawCount,
     Schema,
     Status,
+    pairs,
 )
 from pvid.log import file as logfile
 from pvid.log.file import LOG_SCHEMA, LOG_SCHEMA_TEXT
@@ -56,7 +59,7 @@ NAN, INF, HUGE, TINY = math.nan, math.inf, 3e38, 1e-45
 ABSURD = (NAN, INF, -INF, HUGE, -1.0, 0.0, TINY)
 ESCAPES = "\x1b]0;PWN\x07\x1b[31m"
 LARGEST = 2**31 - 1
-_PAIRS = MAX_P * (MAX_P + 1) // 2  # of parameters
+_PAIRS = len(pairs(PLACES))  # of parameters
 
 
 @dataclass(frozen=True)
@@ -142,10 +145,10 @@ def _from_each_start(board: LyingBoard) -> Steps:
 def _without_units(board: LyingBoard) -> Steps:
     for value in ABSURD:
         board.sequence = 0
-        yield board.say(board.hello(core=1, phi_lsb=value, y_lsb=value, p_unit=(value,) * MAX_P))
+        yield board.say(board.hello(core=1, phi_lsb=value, y_lsb=value, p_unit=(value,) * PLACES))
         yield board.say(message(ConfigureQ31, session=SESSION, phi_offset=LARGEST))
         yield board.say(RawCount.of_values([LARGEST] * 9, [-LARGEST] * 9))
-        yield board.say(message(EstimateQ31, session=SESSION, p=(LARGEST,) * MAX_P, se=(-1,) * MAX_P), 9)
+        yield board.say(message(EstimateQ31, session=SESSION, p=(LARGEST,) * PLACES, se=(-1,) * PLACES), 9)
 
 
 def _of_another_version(number: int) -> bytes:
@@ -222,7 +225,7 @@ def _log_of_the_logger(board: LyingBoard) -> Steps:
 def _no_numbers(board: LyingBoard) -> Steps:
     for p in (*ABSURD, 1e30):
         for variance in (*ABSURD, 1e30):
-            told = {"p": (p,) * MAX_P, "covariance": (variance,) * _PAIRS}
+            told = {"p": (p,) * PLACES, "covariance": (variance,) * _PAIRS}
             yield board.say(board.estimate(**told), TICKS)
             yield board.say(board.estimate(**told, kappa=NAN, residual_sd=INF, weight=-1.0), TICKS)
 
@@ -368,7 +371,7 @@ _enter(
         "the other form and the other core": _hellos(form=(0, 1), core=(1,)),
         "windows of none and of all": _hellos(window=(0, 65535)),
         "units that are none": _hellos(
-            phi_lsb=ABSURD, y_lsb=ABSURD, p_unit=tuple((value,) * MAX_P for value in ABSURD)
+            phi_lsb=ABSURD, y_lsb=ABSURD, p_unit=tuple((value,) * PLACES for value in ABSURD)
         ),
         "units that are none in fixed point": _without_units,
         "sessions that never begin": _of_each(
@@ -400,11 +403,11 @@ _enter(
         "row sd that is none": _configurations(row_sd=ABSURD),
         "laws that there are not": _configurations(law=(2, 200, 255)),
         "dividers of none and of all": _configurations(divider=(0, 65535)),
-        "starts that are none": _configurations(start=tuple((value,) * MAX_P for value in ABSURD)),
-        "standard deviations that are none": _configurations(start_sd=tuple((value,) * MAX_P for value in ABSURD)),
+        "starts that are none": _configurations(start=tuple((value,) * PLACES for value in ABSURD)),
+        "standard deviations that are none": _configurations(start_sd=tuple((value,) * PLACES for value in ABSURD)),
         "limits that are none": _configurations(
-            lower=tuple((value,) * MAX_P for value in (NAN, INF, HUGE)),
-            upper=tuple((value,) * MAX_P for value in (NAN, -INF, 0.0)),
+            lower=tuple((value,) * PLACES for value in (NAN, INF, HUGE)),
+            upper=tuple((value,) * PLACES for value in (NAN, -INF, 0.0)),
         ),
         "memories and feedbacks that are none": _configurations(forgetting_s=ABSURD, feedback_hz=ABSURD),
         "sources and forms that there are not": _configurations(source=(3, 255), form=(0, 7), hash_every=(0,)),
@@ -471,7 +474,18 @@ _enter(
             range(256), lambda board, reason: [board.say(board.estimate(reason=reason), TICKS)]
         ),
         "estimates beyond physics": _of_each(
-            _BEYOND, lambda board, p: [board.say(board.estimate(p=(*p, *[0.0] * (MAX_P - 3))), TICKS)]
+            _BEYOND, lambda board, p: [board.say(board.estimate(p=(*p, *[0.0] * (PLACES - 3))), TICKS)]
+        ),
+        "estimates of more parameters": _of_each(
+            ABSURD,
+            lambda board, value: (
+                board.say(one, TICKS, WIDE_SCHEMA)
+                for one in (
+                    board.estimate(p=(value,) * WIDE, covariance=(value,) * len(pairs(WIDE))),
+                    message(EstimateQ31, p=(LARGEST,) * WIDE, se=(-1,) * WIDE, correlation=(1,) * len(pairs(WIDE))),
+                    board.hello(n_p=WIDE, p_unit=(value,) * WIDE),
+                )
+            ),
         ),
         "estimates of the other core": _of_each(
             (0, LARGEST, -LARGEST - 1),
@@ -479,8 +493,8 @@ _enter(
                 board.say(
                     message(
                         EstimateQ31,
-                        p=(value,) * MAX_P,
-                        se=(value,) * MAX_P,
+                        p=(value,) * PLACES,
+                        se=(value,) * PLACES,
                         correlation=(value,) * _PAIRS,
                         kappa=value,
                         residual_sd=value,

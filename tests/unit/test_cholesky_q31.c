@@ -31,7 +31,7 @@ static void solving_returns_what_was_multiplied(void **state)
         for (int k = 0; k < 50; k++) {
             int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
             double exact[PVID_MAX_P][PVID_MAX_P];
-            make(n, 0.3, s, exact);
+            make(n, (n <= 4u) ? 0.3 : (0.9 / (n - 1.0)), s, exact); /* the diagonal dominates */
             pvid_cholesky_q31 factor;
             assert_true(pvid_cholesky_factor_q31(&factor, n, (const int32_t (*)[PVID_MAX_P])s));
             double x[PVID_MAX_P];
@@ -76,6 +76,32 @@ static void indefinite_matrix_gives_zero_first_pivot(void **state)
         assert_false(pvid_cholesky_factor_q31(&factor, n, (const int32_t (*)[PVID_MAX_P])s));
         assert_false(factor.positive);
         assert_int_equal(factor.first_pivot, 0);
+    }
+}
+
+/* No sum overflows, or the sanitizers tell: a row of ones over the identity, and a solution as large as they are. */
+static void the_largest_sums_fit(void **state)
+{
+    int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        s[i][i] = (1 << 30) - 1;
+        s[0][i] = s[i][i];
+    }
+    pvid_cholesky_q31 factor;
+    assert_false(pvid_cholesky_factor_q31(&factor, PVID_MAX_P, (const int32_t (*)[PVID_MAX_P])s));
+    const double u = sqrt(1.0 - (1.5 / 1048576.0)); /* above the least pivot */
+    int64_t rhs[PVID_MAX_P];
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        for (size_t j = i + 1u; j < PVID_MAX_P; j++) {
+            s[i][j] = (int32_t)(((j == PVID_MAX_P - 1u) ? u : (u * u)) * ONE);
+        }
+        rhs[i] = (i == PVID_MAX_P - 1u) ? 0 : INT64_MAX - 1;
+    }
+    assert_true(pvid_cholesky_factor_q31(&factor, PVID_MAX_P, (const int32_t (*)[PVID_MAX_P])s));
+    int32_t found[PVID_MAX_P];
+    (void)pvid_cholesky_solve_q31(&factor, rhs, found);
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        assert_true((found[i] >= -PVID_X_MAX) && (found[i] <= PVID_X_MAX));
     }
 }
 
@@ -132,6 +158,7 @@ static void a_scale_ends_at_the_widest(void **state)
 static const struct CMUnitTest tests[] = {
     cmocka_unit_test(solving_returns_what_was_multiplied),
     cmocka_unit_test(indefinite_matrix_gives_zero_first_pivot),
+    cmocka_unit_test(the_largest_sums_fit),
     cmocka_unit_test(only_eliminated_columns_are_read),
     cmocka_unit_test(a_block_keeps_its_largest_entry_in_so_many_bits),
     cmocka_unit_test(a_scale_ends_at_the_widest),

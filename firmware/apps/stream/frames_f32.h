@@ -32,11 +32,11 @@ static inline void get_estimator_config(pvid_estimator_config_f32 *estimator,
 }
 
 /* Writes p and the upper triangle of its covariance. */
-static inline void put_p(uint8_t p[4u * LINK_MAX_P], uint8_t covariance[], const pvid_estimate_f32 *estimate)
+static inline void put_p(uint8_t p[4u * PVID_LINK_P], uint8_t covariance[], const pvid_estimate_f32 *estimate)
 {
     size_t at = 0;
-    for (size_t i = 0; i < LINK_MAX_P; i++) {
-        for (size_t j = i; j < LINK_MAX_P; j++) {
+    for (size_t i = 0; i < PVID_LINK_P; i++) {
+        for (size_t j = i; j < PVID_LINK_P; j++) {
             if (j < STREAM_N_P) {
                 pvid_put_f32(&covariance[at], estimate->covariance[i][j]);
             }

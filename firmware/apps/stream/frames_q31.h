@@ -35,8 +35,8 @@ static inline void put_estimate(uint8_t payload[PVID_ESTIMATE_Q31_BYTES], const 
     pvid_put_u32(&payload[PVID_ESTIMATE_Q31_SESSION], session);
     pvid_put_u32(&payload[PVID_ESTIMATE_Q31_UPDATES], updates);
     size_t at = PVID_ESTIMATE_Q31_CORRELATION;
-    for (size_t i = 0; i < LINK_MAX_P; i++) {
-        for (size_t j = i; j < LINK_MAX_P; j++) {
+    for (size_t i = 0; i < PVID_LINK_P; i++) {
+        for (size_t j = i; j < PVID_LINK_P; j++) {
             if (j < STREAM_N_P) {
                 pvid_put_i32(&payload[at], estimate->correlation[i][j]);
             }

@@ -41,11 +41,6 @@
 #endif
 
 #define SAMPLE_BYTES (4u * STREAM_SAMPLES) /* the samples of a tick in a frame */
-#define LINK_MAX_P 8u                      /* places for parameters in a frame */
-
-#if PVID_MAX_P > 8
-#error "the frames hold eight parameters"
-#endif
 
 /* Faults of the arithmetic that the bits hang on; 0 where there are none. */
 uint32_t identifier_arithmetic_faults(void);

@@ -14,9 +14,7 @@
 static pvid_weak_f32 identifier;
 
 #ifdef STREAM_REFINED
-#if STREAM_SHOWN > 8
-#error "the frames hold eight parameters"
-#endif
+typedef char frames_hold_the_refined[(STREAM_SHOWN <= PVID_LINK_P) ? 1 : -1];
 
 static pvid_refine_f32 refinement;
 static const pvid_weak_refine_f32 second = {&pvid_refiner_f32, &refinement, &stream_refine_config};

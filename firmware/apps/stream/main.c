@@ -33,7 +33,8 @@
 #else
 #define REFINED_ROOM 0u
 #endif
-#define ANSWER_ROOM (640u + REFINED_ROOM) /* bytes of all answers to one sample or request, without announcements */
+/* Bytes of all answers to one sample or request, without announcements. */
+#define ANSWER_ROOM (PVID_LINK_PLACES(640u, 1152u) + REFINED_ROOM)
 #define CHUNK 64u
 #define ANNOUNCE_S 4u
 
@@ -100,7 +101,7 @@ static void answer(uint8_t type, const uint8_t payload[], size_t length)
 static void answer_hello(void)
 {
     static const char board[] = PVID_BOARD_NAME;
-    static const float p_unit[] = STREAM_P_UNIT; /* at most LINK_MAX_P */
+    static const float p_unit[] = STREAM_P_UNIT; /* at most PVID_LINK_P */
     uint8_t payload[PVID_HELLO_BYTES];
     memset(payload, 0, sizeof payload);
     payload[PVID_HELLO_FORM] = STREAM_FORM;

@@ -32,8 +32,8 @@
 #ifndef PVID_MAX_P
 #define PVID_MAX_P 4
 #endif
-#if PVID_MAX_P < 3 || PVID_MAX_P > 8
-#error "PVID_MAX_P must lie in 3..8"
+#if PVID_MAX_P < 3 || PVID_MAX_P > 16
+#error "PVID_MAX_P must lie in 3..16"
 #endif
 
 /* Largest number of constraints between parameters (model.h); 0 leaves them out. */

@@ -42,7 +42,7 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     const size_t n = self->n;
     const int32_t diagonal = s[j][j];
     int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
-    for (size_t k = j + 1u; k < n; k++) {
+    for (size_t k = j + 1u; (k < n) && ((PVID_MAX_P <= 8) || (pivot >= 0)); k++) { /* 8 squares cannot wrap */
         pivot -= pvid_short_square_q31(self->u[j][k]);
     }
     if (!pvid_pivot_is_significant_q31(pivot, diagonal)) {
@@ -90,7 +90,7 @@ void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[],
         for (size_t k = i + 1u; k < self->n; k++) {
             sum -= pvid_short_product_q31(self->u[i][k], x[k]);
         }
-        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
+        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_X_MAX);
     }
 }
 
@@ -101,7 +101,7 @@ static void solve_upper(const pvid_cholesky_q31 *self, const int32_t rhs[], int3
         for (size_t k = 0; k < i; k++) {
             sum -= pvid_short_product_q31(self->u[k][i], x[k]);
         }
-        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
+        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_X_MAX);
     }
 }
 

@@ -15,6 +15,10 @@
 /* Bits of a right-hand side: U^-1 makes it grow by 2^10 at most. */
 #define PVID_RHS_BITS 20
 
+/* Largest |x| of a solution and of a column of an inverse. Sums of n squares and of n - 1 products with 30 bits stay
+ * below 2^63. */
+#define PVID_X_MAX ((PVID_MAX_P > 8) ? (PVID_ONE_Q30 / 2) : PVID_ONE_Q30)
+
 /* e such that diagonal 2^(-2 e) lies in [2^28, 2^30), for diagonal > 0; -15 for 0. */
 int32_t pvid_half_exponent_q31(int64_t diagonal);
 

@@ -116,7 +116,7 @@ PVID_COLD void pvid_constraints_at_f32(pvid_constraints_f32 *self, const pvid_mo
         swap_rows(rows, length, self->count, row);
         eliminate(m, n, rows, self->count, column);
         self->place[self->count] = (uint8_t)column;
-        self->dependent = (uint8_t)((uint32_t)self->dependent | ((uint32_t)1u << column));
+        self->dependent = (pvid_p_bits)((uint32_t)self->dependent | ((uint32_t)1u << column));
         self->count++;
     }
     for (size_t k = 0; k < self->count; k++) {

@@ -62,7 +62,7 @@ PVID_COLD void pvid_drift_forget_f32(pvid_estimator_f32 *self)
     if (model->n_drifts == 0u) {
         return;
     }
-    float c[PVID_MAX_THETA * PVID_MAX_P];
+    float c[PVID_MAX_C];
     float d[PVID_MAX_DRIFTS * PVID_MAX_P];
     model->jacobian(self->p, c);
     model->drifts(self->p, d);

@@ -107,7 +107,7 @@ static bool model_is_valid(const pvid_model_f32 *model)
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
            (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && ((PVID_EXACT == 0) || (model->n_p == PVID_MAX_P)) &&
-           constraints_are_valid(model) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) &&
+           constraints_are_valid(model) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_C) &&
            (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
            (model->n_moments == pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end));
 }
@@ -160,7 +160,7 @@ PVID_COLD static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estima
     self->settings.noise_margin = config->noise_margin;
     self->settings.dead_zone = config->dead_zone * config->dead_zone;
     self->settings.n_p = config->model->n_p;
-    self->settings.positive = (uint8_t)(config->model->positive & 0xFFu);
+    self->settings.positive = (pvid_p_bits)(config->model->positive & PVID_P_ALL);
     self->divider = config->divider;
     prepare_drifts(self, config);
     if (!return_to_constraints(self, self->p)) {
@@ -263,7 +263,7 @@ PVID_COLD pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, cons
         b[i] += g[i];
     }
     if (pvid_feeds_back_f32(self)) {
-        float c[PVID_MAX_THETA * PVID_MAX_P];
+        float c[PVID_MAX_C];
         float gradient[PVID_MAX_P];
         const pvid_block whole = {0, model->n_theta, 0};
         model->jacobian(self->p, c);

@@ -51,7 +51,7 @@ PVID_COLD void pvid_products_end_f32(pvid_estimator_f32 *self, const pvid_block 
     const uint32_t room = UINT32_MAX - self->counters.rows;
     self->counters.rows += (rows < room) ? rows : room;
     if (pvid_feeds_back_f32(self)) {
-        float c[PVID_MAX_THETA * PVID_MAX_P];
+        float c[PVID_MAX_C];
         float innovation[PVID_MAX_P];
         model->jacobian(self->p, c);
         pvid_pattern_transpose_times_f32(model, c, block, gradient, innovation);

@@ -89,7 +89,7 @@ PVID_COLD void pvid_settings_init_q31(pvid_solve_settings_q31 *self, const pvid_
     self->noise_margin = config->noise_margin;
     self->dead_zone = config->dead_zone;
     self->n_p = n_p;
-    self->positive = (uint8_t)(positive & 0xFFu);
+    self->positive = (pvid_p_bits)(positive & PVID_P_ALL);
 }
 
 uint32_t pvid_fingerprint_estimator_q31(uint32_t hash, const pvid_estimator_config_q31 *config, size_t n_theta,

@@ -57,7 +57,7 @@ static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *b
 {
     const pvid_model_f32 *model = self->model;
     if (pvid_feeds_back_f32(self)) {
-        float c[PVID_MAX_THETA * PVID_MAX_P];
+        float c[PVID_MAX_C];
         model->jacobian(self->p, c);
         pvid_pattern_transpose_times_f32(model, c, block, n, gradient);
     }
@@ -223,7 +223,8 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
         pvid_count_up(&self->counters.in_dead_zone);
     }
     pvid_count_step(&self->counters, solution.limited, solution.bounded);
-    self->settings.blocked = (uint8_t)((solution.blocked != 0u) ? (solution.blocked | (uint32_t)solve->pinned) : 0u);
+    self->settings.blocked =
+        (pvid_p_bits)((solution.blocked != 0u) ? (solution.blocked | (uint32_t)solve->pinned) : 0u);
     solve->in_dead_zone = solution.in_dead_zone;
     solve->size = solution.size;
 }

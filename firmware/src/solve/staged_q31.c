@@ -200,7 +200,7 @@ static void pin(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
             solve->now.system.s[a][b] = free ? solve->now.system.s[a][b] : 0;
         }
     }
-    solve->pinned = (uint8_t)pinned;
+    solve->pinned = (pvid_p_bits)pinned;
 }
 
 static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
@@ -293,7 +293,7 @@ static void take_step(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
     if (blocked != 0u) { /* the others would go elsewhere without it: no step */
         memcpy(solve->now.step.p, self->p, sizeof solve->now.step.p);
     }
-    self->settings.blocked = (uint8_t)((blocked != 0u) ? (blocked | (uint32_t)solve->pinned) : 0u);
+    self->settings.blocked = (pvid_p_bits)((blocked != 0u) ? (blocked | (uint32_t)solve->pinned) : 0u);
     pvid_count_step(&self->counters, solution.limited, solution.bounded || (solve->pinned != 0u));
 }
 

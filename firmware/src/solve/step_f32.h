@@ -20,13 +20,13 @@
 
 /* A step. The caller sets p, which may be the p of the equations; it is written only if a step is taken. */
 typedef struct {
-    float *p;           /* [n_p] p after the step, within its bounds */
-    float size;         /* largest |dp/p| before step_limit; 0 if there is no step */
-    pvid_reason reason; /* PVID_UPDATED, or PVID_HELD_SINGULAR if dp is not finite */
-    bool in_dead_zone;  /* p is within the dead zone: no step */
-    bool limited;       /* shortened to step_limit */
-    bool bounded;       /* a parameter was stopped at its bound, or stays there */
-    uint8_t blocked;    /* bit a: p[a] is at a bound and dp pulls it outwards: no step */
+    float *p;            /* [n_p] p after the step, within its bounds */
+    float size;          /* largest |dp/p| before step_limit; 0 if there is no step */
+    pvid_reason reason;  /* PVID_UPDATED, or PVID_HELD_SINGULAR if dp is not finite */
+    bool in_dead_zone;   /* p is within the dead zone: no step */
+    bool limited;        /* shortened to step_limit */
+    bool bounded;        /* a parameter was stopped at its bound, or stays there */
+    pvid_p_bits blocked; /* bit a: p[a] is at a bound and dp pulls it outwards: no step */
 } pvid_solution_f32;
 
 /* Relative size of a step in parameter a: relative to p if it is a positive parameter, else to start_sd. Returns the
@@ -75,17 +75,17 @@ static inline bool pvid_step_is_held_f32(float p, float lower, float upper, floa
 }
 
 /* Parameters that are at a bound from which `pull` moves them outwards, a bit for each. */
-static inline uint8_t pvid_step_outwards_f32(size_t n, const float p[], const float lower[], const float upper[],
-                                             const float pull[])
+static inline pvid_p_bits pvid_step_outwards_f32(size_t n, const float p[], const float lower[], const float upper[],
+                                                 const float pull[])
 {
     uint32_t outwards = 0;
     for (size_t a = 0; a < n; a++) {
         outwards |= pvid_step_is_held_f32(p[a], lower[a], upper[a], pull[a]) ? ((uint32_t)1u << a) : 0u;
     }
-    return (uint8_t)outwards;
+    return (pvid_p_bits)outwards;
 }
 
-static inline bool pvid_step_has_f32(uint8_t bits, size_t a)
+static inline bool pvid_step_has_f32(pvid_p_bits bits, size_t a)
 {
     return (((uint32_t)bits >> a) & 1u) != 0u;
 }
@@ -93,12 +93,12 @@ static inline bool pvid_step_has_f32(uint8_t bits, size_t a)
 /* Bounds are one-sided constraints. Those that act keep their parameters, a bit for each: F pulls these outwards, or
  * the last solve would have (`blocked`). Their diagonal entry of S is raised, as if they were known, so that the others
  * are solved without them. Source: theory.md 4, (6a). */
-static inline uint8_t pvid_step_pin_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
-                                        const float p[])
+static inline pvid_p_bits pvid_step_pin_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                                            const float p[])
 {
     const size_t n_p = PVID_COUNT(PVID_MAX_P, settings->n_p);
     const uint32_t outwards = pvid_step_outwards_f32(n_p, p, settings->lower, settings->upper, system->force);
-    const uint8_t pinned = (uint8_t)(outwards | settings->blocked);
+    const pvid_p_bits pinned = (pvid_p_bits)(outwards | settings->blocked);
     for (size_t a = 0; (pinned != 0u) && (a < n_p); a++) {
         system->s[a][a] *= pvid_step_has_f32(pinned, a) ? PVID_PIN : 1.0f;
     }
@@ -106,7 +106,7 @@ static inline uint8_t pvid_step_pin_f32(pvid_system_f32 *system, const pvid_solv
 }
 
 /* dp = 0 for the pinned parameters. */
-static inline void pvid_step_hold_f32(size_t n, uint8_t pinned, float dp[])
+static inline void pvid_step_hold_f32(size_t n, pvid_p_bits pinned, float dp[])
 {
     for (size_t a = 0; (pinned != 0u) && (a < n); a++) {
         dp[a] = pvid_step_has_f32(pinned, a) ? 0.0f : dp[a];
@@ -183,7 +183,7 @@ static inline pvid_reason pvid_step_factor_f32(const pvid_system_f32 *system, co
  * others would go elsewhere. Fails iff dp is not finite: solution->reason is PVID_HELD_SINGULAR. Cost: a solve, two
  * with a dead zone, n_p + 1 divisions. Source: theory.md 4, (6), (6a). */
 static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
-                                      const pvid_cholesky_f32 *factor, uint8_t pinned, const float p[],
+                                      const pvid_cholesky_f32 *factor, pvid_p_bits pinned, const float p[],
                                       const float rhs[], pvid_solution_f32 *solution)
 {
     float dp[PVID_MAX_P];

@@ -554,7 +554,7 @@ static inline pvid_reason move(strong_estimator_f32 *self, const float dp[STRONG
 }
 
 /* Parameters that a force or a step pulls out of their bounds. Equation (5) alone has no solution to stay at. */
-static PVID_COLD uint8_t outwards(const strong_estimator_f32 *self, const float pull[STRONG_P])
+static PVID_COLD pvid_p_bits outwards(const strong_estimator_f32 *self, const float pull[STRONG_P])
 {
     const pvid_estimator_config_f32 *config = &self->config->estimator;
     const bool stays = self->gain > 0.0f;
@@ -565,8 +565,8 @@ static PVID_COLD uint8_t outwards(const strong_estimator_f32 *self, const float 
  * next one. */
 static PVID_COLD bool is_blocked(strong_estimator_f32 *self, const float dp[STRONG_P])
 {
-    const uint8_t blocked = outwards(self, dp);
-    self->blocked = (uint8_t)((blocked != 0u) ? (blocked | (uint32_t)self->pinned) : 0u);
+    const pvid_p_bits blocked = outwards(self, dp);
+    self->blocked = (pvid_p_bits)((blocked != 0u) ? (blocked | (uint32_t)self->pinned) : 0u);
     return blocked != 0u;
 }
 
@@ -618,7 +618,7 @@ static inline void project_all(strong_estimator_f32 *self, const strong_gradient
         rhs[a] = (self->gain * force[a]) + ((1.0f - self->gain) * rhs[a]);
     }
     if (self->counters.bounded > 0u) {
-        self->pinned = (uint8_t)(outwards(self, force) | (uint32_t)self->blocked);
+        self->pinned = (pvid_p_bits)(outwards(self, force) | (uint32_t)self->blocked);
     }
 }
 

@@ -35,7 +35,7 @@ PVID_COLD void pvid_weak_scores_take_f32(pvid_weak_scores_f32 *self, const pvid_
                                          const float sum[])
 {
     const pvid_model_f32 *model = estimator->model;
-    float c[PVID_MAX_THETA * PVID_MAX_P];
+    float c[PVID_MAX_C];
     model->jacobian(estimator->p, c);
     memset(self->own, 0, sizeof self->own);
     for (size_t k = 0; k < model->n_c; k++) {

@@ -14,7 +14,7 @@
 #define LEAST_SQUARE ((int32_t)1 << 18) /* of scores that need no smaller unit */
 #define SCORE_MAX ((int32_t)1 << DIGITS)
 #define MEAN_MAX (2 * SCORE_MAX * SCORE_MAX)
-#define Z_DOWN 15 /* from a product of 29 bits to 14 */
+#define Z_DOWN ((PVID_MAX_P > 8) ? 16 : 15) /* from a product of 29 bits to 14, so that sums of all pairs have 31 */
 
 /* Far below: one part in so many of the mean. */
 #define FAR_BELOW 20

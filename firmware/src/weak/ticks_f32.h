@@ -13,7 +13,7 @@
 #include "pvid/weak.h"
 
 /* Largest number of stages per tick. */
-#define PVID_WEAK_MOST_STAGES 64u
+#define PVID_WEAK_MOST_STAGES 255u
 
 /* Least D whose jets and channels have a tick each. */
 #define PVID_WEAK_TWO_TICKS 4u

@@ -15,7 +15,7 @@
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define OFFSET_LIMIT ((int32_t)1 << 30)
-#define STAGES_MAX 64u
+#define STAGES_MAX 255u
 #define ONE_Q16 65536u
 
 /* No reason of a tick: there is work. */

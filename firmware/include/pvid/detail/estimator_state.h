@@ -2,6 +2,7 @@
 #ifndef PVID_DETAIL_ESTIMATOR_STATE_H
 #define PVID_DETAIL_ESTIMATOR_STATE_H
 
+#include "pvid/detail/p_bits.h"
 #include "pvid/estimator.h"
 
 /* What the step and the assessment need beside the normal equations; written by init alone, but for `blocked`. */
@@ -20,16 +21,16 @@ typedef struct {
 #if PVID_MAX_DRIFTS > 0
     float drift_keep; /* share of the information along a drift that a group leaves */
 #endif
-    uint8_t n_p;      /* parameters */
-    uint8_t positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a]; PVID_MAX_P <= 8 */
-    uint8_t blocked;  /* bit a set: p[a] was at its bound, and the last solve would have moved it outwards */
+    uint8_t n_p;          /* parameters */
+    pvid_p_bits positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a] */
+    pvid_p_bits blocked;  /* bit a set: p[a] was at its bound, and the last solve would have moved it outwards */
 } pvid_solve_settings_f32;
 
 #if PVID_MAX_CONSTRAINTS > 0
 /* Constraints at a p, each solved for a parameter: dp[place] = rest - slope dp. */
 typedef struct {
     uint8_t count;                       /* of those that are independent of each other */
-    uint8_t dependent;                   /* bit a: p[a] is the place of one */
+    pvid_p_bits dependent;               /* bit a: p[a] is the place of one */
     uint8_t place[PVID_MAX_CONSTRAINTS]; /* that parameter */
     float rest[PVID_MAX_CONSTRAINTS];
     float slope[PVID_MAX_CONSTRAINTS][PVID_MAX_P]; /* 0 of dependent parameters */
@@ -82,8 +83,8 @@ typedef struct {
 
 /* What one part of a solve needs after the other; an assessment needs C and the factor. */
 typedef union {
-    float c[PVID_MAX_THETA * PVID_MAX_P]; /* until S and F are formed */
-    pvid_cholesky_f32 factor;             /* until dp is known */
+    float c[PVID_MAX_C];      /* until S and F are formed */
+    pvid_cholesky_f32 factor; /* until dp is known */
     struct {
         float after[PVID_MAX_THETA]; /* the step */
         float step[PVID_MAX_THETA];  /* dtheta */
@@ -109,11 +110,11 @@ struct pvid_estimator_solve_f32 {
     uint8_t next;  /* next non-zero of this column */
     uint8_t end;   /* behind its last one */
     bool ends_group;
-    bool in_dead_zone; /* within the dead zone: no step is taken */
-    uint8_t pinned;    /* bit a: p[a] stays at its bound */
-    float gain;        /* g of this solve */
-    float fall;        /* decrease of rr by the step */
-    float scale;       /* sum of M_ii dtheta_i^2: size of the terms that cancel in `fall` */
+    bool in_dead_zone;  /* within the dead zone: no step is taken */
+    pvid_p_bits pinned; /* bit a: p[a] stays at its bound */
+    float gain;         /* g of this solve */
+    float fall;         /* decrease of rr by the step */
+    float scale;        /* sum of M_ii dtheta_i^2: size of the terms that cancel in `fall` */
     float sums[PVID_MAX_SUMS];
     pvid_solve_work_f32 work;
     pvid_system_f32 system;

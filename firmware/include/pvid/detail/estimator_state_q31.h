@@ -2,6 +2,7 @@
 #ifndef PVID_DETAIL_ESTIMATOR_STATE_Q31_H
 #define PVID_DETAIL_ESTIMATOR_STATE_Q31_H
 
+#include "pvid/detail/p_bits.h"
 #include "pvid/estimator_q31.h"
 
 /* Layout of the sums: M (the upper triangle of the block of each kind by rows), n_theta of b, rr, weight (Q16). */
@@ -41,9 +42,9 @@ typedef struct {
     uint32_t noise_margin;
     uint32_t dead_zone;
     int8_t p_bits[PVID_MAX_P];
-    uint8_t n_p;      /* parameters */
-    uint8_t positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a] */
-    uint8_t blocked;  /* bit a set: p[a] was at its bound, and the last solve would have moved it outwards */
+    uint8_t n_p;          /* parameters */
+    pvid_p_bits positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a] */
+    pvid_p_bits blocked;  /* bit a set: p[a] was at its bound, and the last solve would have moved it outwards */
 } pvid_solve_settings_q31;
 
 /* Only the functions of estimator_q31.h write to it. */
@@ -154,7 +155,7 @@ struct pvid_estimator_solve_q31 {
     bool has_fallback;
     bool in_dead_zone;            /* within the dead zone: no step is taken */
     bool keeps_matrix;            /* M is that of the last solve: m and h stay */
-    uint8_t pinned;               /* bit a: p[a] stays at its bound */
+    pvid_p_bits pinned;           /* bit a: p[a] stays at its bound */
     int32_t fallback[PVID_MAX_P]; /* value of p if no step is allowed */
     int64_t size;                 /* largest |dp/p| of the step before step_limit, Q22; 0 if p is held */
     int64_t group_rss;            /* sum of e^2 of the group's rows, each at the p of its tick */

@@ -133,7 +133,7 @@ typedef struct {
 
 /* C at p, and of a kind: one of its columns, and the covariance of the noise in N times that; of Y too. */
 typedef struct {
-    float c[PVID_MAX_THETA * PVID_MAX_P];
+    float c[PVID_MAX_C];
     float column[PVID_MAX_THETA + 1];
     float product[PVID_MAX_THETA + 1];
 } pvid_weak_slopes_f32;

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Form, Message, Sample, Source
+from pvid.link.frames import Configuration, Configure, Form, Message, Sample, Source, in_places
 from pvid.model.compiled import CompiledModel
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.enums import Law
@@ -68,9 +68,7 @@ class FloatBoard:
     ) -> Configuration:
         """The frame that configures a board whose image has these `settings`, with a new session number."""
         own = self.config.estimator
-        places: dict[str, Any] = {
-            name: (*getattr(own, name).tolist(), *[0.0] * (MAX_P - len(own.start))) for name in PER_PARAMETER
-        }
+        places: dict[str, Any] = {name: in_places(getattr(own, name).tolist()) for name in PER_PARAMETER}
         return Configure(
             session=secrets.randbelow(2**32 - 1) + 1,
             settings=settings,
@@ -93,6 +91,7 @@ class FloatBoard:
             raise PvidError("the board's image contains another core than the log's settings")
         if frame.law not in list(Law):
             raise PvidError(f"the board was configured with law {frame.law}, which does not exist")
+        frame.refuse_fewer(self.p_names)
         own = self.config.estimator
         places: dict[str, Any] = {
             name: np.array(getattr(frame, name)[: len(own.start)], np.float32) for name in PER_PARAMETER

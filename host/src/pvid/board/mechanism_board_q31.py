@@ -29,7 +29,7 @@ from pvid.core.native import Native
 from pvid.core.weak_native_q31 import WeakIdentifierQ31
 from pvid.design.c_tables import float_literal
 from pvid.design.weak_q31 import circle_of
-from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Count, Form, Message, Source
+from pvid.link.frames import Configuration, ConfigureQ31, Count, Form, Message, Source, in_places
 from pvid.link.names import BoardNames, Quantity
 from pvid.models.mechanisms import constants_of
 from pvid.models.simulated_rig import simulated_rig
@@ -169,9 +169,7 @@ class MechanismBoardQ31:
     ) -> Configuration:
         """The frame that configures a board whose image has these `settings`, with a new session number."""
         own = self.config.estimator
-        places: dict[str, Any] = {
-            name: (*getattr(own, name), *[0] * (MAX_P - len(own.start))) for name in _PER_PARAMETER
-        }
+        places: dict[str, Any] = {name: in_places(getattr(own, name)) for name in _PER_PARAMETER}
         return ConfigureQ31(
             session=secrets.randbelow(2**32 - 1) + 1,
             settings=settings,
@@ -190,6 +188,7 @@ class MechanismBoardQ31:
         """The settings with the values of a Configure frame. Raises PvidError for one of the other core."""
         if not isinstance(frame, self.configure_frame):
             raise PvidError("the board's image contains another core than the log's settings")
+        frame.refuse_fewer(self.p_names)
         own = self.config.estimator
         places: dict[str, Any] = {name: tuple(getattr(frame, name)[: len(own.start)]) for name in _PER_PARAMETER}
         single = {name: getattr(frame, name) for name in _SINGLE}

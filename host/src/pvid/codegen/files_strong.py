@@ -61,8 +61,8 @@ typedef struct {{
     uint8_t age;             /* rows in the sums since the last fold */
     uint8_t in_block;        /* rows in `block` */
     bool mixes;              /* gain < 1 */
-    uint8_t pinned;          /* bit a: p[a] stays at its bound until the next projection, */
-    uint8_t blocked;         /* because the last one would have moved it outwards */
+    pvid_p_bits pinned;      /* bit a: p[a] stays at its bound until the next projection, */
+    pvid_p_bits blocked;     /* because the last one would have moved it outwards */
     pvid_counters counters;
     float block[4][{upper}_ATOMS]; /* rows that are not in the sums yet, and the present one */
     float high[{upper}_SUMS];      /* the value of a sum is high + low */
@@ -222,6 +222,7 @@ def header(strong: StrongFunctions, command: str) -> str:
         )
     text = _HEADER.format(name=name, upper=upper, past=past, integrals=integrals, triangle=f"{n_p * (n_p + 1) // 2}")
     body = [
+        '#include "pvid/detail/p_bits.h"',
         '#include "pvid/differentiator.h"',
         '#include "pvid/estimator.h"',
         '#include "pvid/gate.h"',

@@ -31,6 +31,7 @@ _MEANING = {
     "PVID_MAX_POWER": "derivatives of its test functions",
     "PVID_MAX_DECIMATION": "samples a step",
 }
+_MOST_C = 255  # of the float core: pvid/detail/p_bits.h
 
 
 def too_many_unknowns(name: str, unknowns: int) -> str | None:
@@ -73,6 +74,9 @@ def _checked(name: str, sizes: Mapping[str, int]) -> dict[str, int]:
 
 def sizes_of_model(model: WeakModel) -> dict[str, int]:
     """Macro -> least value. Raises PvidError where the model needs more than the core allows."""
+    if (n_c := model.model.n_c) > _MOST_C:
+        meaning = _MEANING["PVID_MAX_C_Q31"]
+        raise PvidError(f"{model.name} needs {n_c} {meaning} and the C core takes at most {_MOST_C}")
     thetas = [one.thetas for one in model.kind]
     sizes = {
         "PVID_MAX_THETA": model.model.n_theta,

@@ -23,10 +23,10 @@ import re
 import struct
 import zlib
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from enum import IntEnum
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -40,7 +40,9 @@ VERSION = 1
 MAX_PAYLOAD = 2048
 Float = npt.NDArray[np.float64]
 
-MAX_P = 8  # places for parameters; those that a model lacks are 0
+# Places for parameters in the frames of a board with at most 8 of them, and with more; those that a model lacks are 0.
+PLACES, WIDE = 8, 16
+_P, _PAIRS = -1, -2  # counts of a field: of each parameter, of each pair of them
 MAX_SAMPLES = 8  # of a tick
 MAX_FIELDS = 64  # of a payload that a schema text describes
 MAX_LEARNT = 16  # schemas that a decoder keeps of those that a line brought
@@ -151,11 +153,24 @@ class Message:
     def __init_subclass__(cls, messages: dict[int, type[Message]] = MESSAGES) -> None:
         messages[cls.TYPE] = cls
 
+    @property
+    def places(self) -> int:
+        """For parameters."""
+        of_each = [f.name for f in fields(self) if f.metadata.get("count") == _P]
+        return len(getattr(self, of_each[0])) if of_each else PLACES
+
+    def refuse_fewer(self, names: Sequence[str]) -> None:
+        """PvidError where there are more parameters than places for them."""
+        if len(names) > self.places:
+            raise PvidError(f"a board of at most {self.places} parameters, where the rig file has {len(names)}")
+
     @classmethod
     @cache
-    def layout(cls) -> Layout:
-        """Its wire format."""
-        described = tuple((f.name, f.metadata["kind"], f.metadata["count"]) for f in fields(cls))
+    def layout(cls, places: int = PLACES) -> Layout:
+        """Its wire format with so many places for parameters."""
+        counts = {_P: places, _PAIRS: places * (places + 1) // 2}
+        of_fields = [(f.name, f.metadata["kind"], f.metadata["count"]) for f in fields(cls)]
+        described = tuple((name, kind, counts.get(count, count)) for name, kind, count in of_fields)
         described = tuple(sorted(described, key=lambda one: one[2] is None))  # what takes the rest comes last
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
         return Layout(cls.TYPE, name, described)
@@ -168,12 +183,12 @@ class Message:
     @property
     def payload(self) -> bytes:
         """Its bytes on the wire."""
-        return self.layout().pack({f.name: getattr(self, f.name) for f in fields(self)})
+        return self.layout(self.places).pack({f.name: getattr(self, f.name) for f in fields(self)})
 
     @classmethod
-    def of(cls, payload: bytes) -> Self:
+    def of(cls, payload: bytes, places: int = PLACES) -> Self:
         """The message of these bytes."""
-        return cls(**cls.layout().unpack(payload))
+        return cls(**cls.layout(places).unpack(payload))
 
 
 class Form(IntEnum):
@@ -229,7 +244,7 @@ class Hello(Message):
     sample_rate: float = wire("f32")  # ticks a second
     phi_lsb: float = wire("f32")
     y_lsb: float = wire("f32")
-    p_unit: tuple[float, ...] = wire("f32", MAX_P)
+    p_unit: tuple[float, ...] = wire("f32", _P)
     board: str = wire("char", 16)
     tick_high: int = wire("u16", absent=0)
     samples: int = wire("u8", absent=2)  # of a tick
@@ -280,10 +295,10 @@ class Configure(Configuration):
 
     TYPE = 3
     law: int = wire("u8")
-    start: tuple[float, ...] = wire("f32", MAX_P)
-    start_sd: tuple[float, ...] = wire("f32", MAX_P)
-    lower: tuple[float, ...] = wire("f32", MAX_P)
-    upper: tuple[float, ...] = wire("f32", MAX_P)
+    start: tuple[float, ...] = wire("f32", _P)
+    start_sd: tuple[float, ...] = wire("f32", _P)
+    lower: tuple[float, ...] = wire("f32", _P)
+    upper: tuple[float, ...] = wire("f32", _P)
     row_sd: float = wire("f32")
     forgetting_s: float = wire("f32")
     feedback_hz: float = wire("f32")
@@ -295,10 +310,10 @@ class ConfigureQ31(Configuration):
     """Fixed point (estimator_q31.h); the formats are the image's."""
 
     TYPE = 10
-    start: tuple[int, ...] = wire("i32", MAX_P)
-    start_sd: tuple[int, ...] = wire("i32", MAX_P)
-    lower: tuple[int, ...] = wire("i32", MAX_P)
-    upper: tuple[int, ...] = wire("i32", MAX_P)
+    start: tuple[int, ...] = wire("i32", _P)
+    start_sd: tuple[int, ...] = wire("i32", _P)
+    lower: tuple[int, ...] = wire("i32", _P)
+    upper: tuple[int, ...] = wire("i32", _P)
     row_sd: int = wire("i32")
     forgetting_groups: int = wire("u32")
     gain: int = wire("i32")
@@ -404,22 +419,33 @@ class RawCount(_Measured):
         return self.values.astype(np.float64) * lsb
 
 
-_UPPER = MAX_P * (MAX_P + 1) // 2
 NO_STANDING = 0xFFFFFFFF  # of a board that reports none
 
 
+def in_places(numbers: Sequence[Any]) -> tuple[Any, ...]:
+    """One number for each parameter, filled up with zeros: as in a frame."""
+    places = PLACES if len(numbers) <= PLACES else WIDE
+    return (*numbers, *[type(numbers[0])(0)] * (places - len(numbers)))
+
+
 def upper_triangle(matrix: npt.ArrayLike) -> tuple[Any, ...]:
-    """The upper triangle by rows of a matrix [n, n], n at most MAX_P, filled up with zeros: as in a frame."""
+    """The upper triangle by rows of a matrix [n, n], n at most WIDE, filled up with zeros: as in a frame."""
     given = np.asarray(matrix)
-    whole = np.zeros((MAX_P, MAX_P), given.dtype)
+    places = PLACES if len(given) <= PLACES else WIDE
+    whole = np.zeros((places, places), given.dtype)
     whole[: len(given), : len(given)] = given
-    return tuple(whole[np.triu_indices(MAX_P)].tolist())
+    return tuple(whole[np.triu_indices(places)].tolist())
 
 
-def _symmetric(upper: tuple[float, ...]) -> Float:
-    """The matrix [MAX_P, MAX_P] of its upper triangle by rows."""
-    matrix = np.zeros((MAX_P, MAX_P))
-    matrix[np.triu_indices(MAX_P)] = upper
+def pairs(places: int) -> tuple[tuple[int, int], ...]:
+    """Of parameters, in the order of an upper triangle."""
+    return tuple((a, b) for a in range(places) for b in range(a, places))
+
+
+def _symmetric(upper: tuple[float, ...], places: int) -> Float:
+    """The matrix [places, places] of its upper triangle by rows."""
+    matrix = np.zeros((places, places))
+    matrix[np.triu_indices(places)] = upper
     return matrix + np.triu(matrix, 1).T
 
 
@@ -434,8 +460,8 @@ class Estimate(Message):
     TYPE = 6
     session: int = wire("u32")
     updates: int = wire("u32")
-    p: tuple[float, ...] = wire("f32", MAX_P)
-    covariance: tuple[float, ...] = wire("f32", _UPPER)  # upper triangle by rows, of all MAX_P
+    p: tuple[float, ...] = wire("f32", _P)
+    covariance: tuple[float, ...] = wire("f32", _PAIRS)  # upper triangle by rows, of all places
     kappa: float = wire("f32")
     residual_sd: float = wire("f32")
     weight: float = wire("f32")
@@ -446,8 +472,8 @@ class Estimate(Message):
     FULL_KAPPA: ClassVar[float] = 1.0
 
     def in_si(self, units: Float, zero: float) -> tuple[Float, Float]:
-        """p [MAX_P] and its covariance [MAX_P, MAX_P], in the board's units."""
-        return np.array(self.p), _symmetric(self.covariance)
+        """p [places] and its covariance [places, places], in the board's units."""
+        return np.array(self.p), _symmetric(self.covariance, self.places)
 
 
 @dataclass(frozen=True)
@@ -462,10 +488,10 @@ class RefinedEstimate(Message):
     TYPE = 15
     session: int = wire("u32")
     number: int = wire("u32")
-    p: tuple[float, ...] = wire("f32", MAX_P)
-    covariance: tuple[float, ...] = wire("f32", _UPPER)  # upper triangle by rows, of all MAX_P
-    r: tuple[float, ...] = wire("f32", MAX_P)
-    se: tuple[float, ...] = wire("f32", MAX_P)
+    p: tuple[float, ...] = wire("f32", _P)
+    covariance: tuple[float, ...] = wire("f32", _PAIRS)  # upper triangle by rows, of all places
+    r: tuple[float, ...] = wire("f32", _P)
+    se: tuple[float, ...] = wire("f32", _P)
     level: float = wire("f32")
     clash: float = wire("f32")
     reason: int = wire("u8")
@@ -474,8 +500,8 @@ class RefinedEstimate(Message):
 
     @property
     def of_p(self) -> tuple[Float, Float]:
-        """p [MAX_P] and its covariance [MAX_P, MAX_P]."""
-        return np.array(self.p), _symmetric(self.covariance)
+        """p [places] and its covariance [places, places]."""
+        return np.array(self.p), _symmetric(self.covariance, self.places)
 
 
 @dataclass(frozen=True)
@@ -485,9 +511,9 @@ class EstimateQ31(Message):
     TYPE = 13
     session: int = wire("u32")
     updates: int = wire("u32")
-    p: tuple[int, ...] = wire("i32", MAX_P)
-    se: tuple[int, ...] = wire("i32", MAX_P)
-    correlation: tuple[int, ...] = wire("i32", _UPPER)  # Q30, upper triangle by rows
+    p: tuple[int, ...] = wire("i32", _P)
+    se: tuple[int, ...] = wire("i32", _P)
+    correlation: tuple[int, ...] = wire("i32", _PAIRS)  # Q30, upper triangle by rows
     kappa: int = wire("i32")
     residual_sd: int = wire("i32")
     weight: int = wire("u32")
@@ -498,11 +524,12 @@ class EstimateQ31(Message):
     FULL_KAPPA: ClassVar[float] = 2.0**30
 
     def in_si(self, units: Float, zero: float) -> tuple[Float, Float]:
-        """p [MAX_P] and its covariance [MAX_P, MAX_P] of a board with these units of p [MAX_P]; `zero` [rad] is added
-        to c."""
-        se, p = np.array(self.se) * units, np.array(self.p) * units
+        """p [places] and its covariance of a board with these units of p; `zero` [rad] is added to c."""
+        of_each = np.full(self.places, np.nan)
+        of_each[: len(units)] = units[: self.places]
+        se, p = np.array(self.se) * of_each, np.array(self.p) * of_each
         p[3] += zero
-        return p, _symmetric(self.correlation) / 2**30 * np.outer(se, se)
+        return p, _symmetric(self.correlation, self.places) / 2**30 * np.outer(se, se)
 
 
 @dataclass(frozen=True)
@@ -556,14 +583,16 @@ class Credit(Message):
 MESSAGES.pop(0)
 
 
-def schema_text(messages: Mapping[int, type[Message]]) -> str:
+def schema_text(messages: Mapping[int, type[Message]], places: int = PLACES) -> str:
     """What `parse_schema` reads; its CRC-32 stands in the header of every frame."""
-    return "\n".join([f"pvid {VERSION}", *(messages[number].layout().text for number in sorted(messages))])
+    return "\n".join([f"pvid {VERSION}", *(messages[number].layout(places).text for number in sorted(messages))])
 
 
 LAYOUTS = {number: MESSAGES[number].layout() for number in sorted(MESSAGES)}
 SCHEMA_TEXT = schema_text(MESSAGES)
 SCHEMA = zlib.crc32(SCHEMA_TEXT.encode())
+WIDE_SCHEMA_TEXT = schema_text(MESSAGES, WIDE)
+WIDE_SCHEMA = zlib.crc32(WIDE_SCHEMA_TEXT.encode())
 
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]{0,31}"
@@ -624,9 +653,14 @@ class Described(Message, messages={}):
 Readers = Mapping[int, Callable[[bytes], Message]]
 
 
-def readers(messages: Mapping[int, type[Message]]) -> Readers:
+def readers(messages: Mapping[int, type[Message]], places: int = PLACES) -> Readers:
     """What a decoder reads these messages with."""
-    return {number: kind.of for number, kind in messages.items()}
+    return {number: partial(kind.of, places=places) for number, kind in messages.items()}
+
+
+def of_boards() -> dict[int, Readers]:
+    """Of boards with few parameters and with many, by schema."""
+    return {SCHEMA: readers(MESSAGES), WIDE_SCHEMA: readers(MESSAGES, WIDE)}
 
 
 def _extends(layout: Layout, today: Layout, absent: Mapping[str, int]) -> bool:
@@ -659,15 +693,15 @@ _FORMER_P = 6
 
 def _of_two_samples(kind: type[Message], values: Mapping[str, Any]) -> Message:
     """The message of today of a frame as it was then."""
-    places = {f.name: f.metadata["count"] for f in fields(kind)}
+    counts = {f.name: f.metadata["count"] for f in fields(kind)}
     found: dict[str, Any] = {}
     for name, value in values.items():
-        wanted = places.get(name)
+        wanted = counts.get(name)
         if name == "phi_y":
             found["data"] = value
-        elif wanted == MAX_P:
-            found[name] = (*value, *(0,) * (MAX_P - _FORMER_P))
-        elif wanted == _UPPER:
+        elif wanted == _P:
+            found[name] = in_places(value)
+        elif wanted == _PAIRS:
             matrix = np.zeros((_FORMER_P, _FORMER_P), np.asarray(value).dtype)
             matrix[np.triu_indices(_FORMER_P)] = value
             found[name] = upper_triangle(matrix)
@@ -685,9 +719,8 @@ def described_readers(text: str) -> Readers:
 
     def reader(layout: Layout) -> Callable[[bytes], Message]:
         known = MESSAGES.get(layout.type)
-        if known is not None and layout == LAYOUTS[layout.type]:
-            return known.of
-        if known is not None and _extends(layout, LAYOUTS[layout.type], known.absent()):
+        of_today = () if known is None else (known.layout(PLACES), known.layout(WIDE))
+        if known is not None and any(_extends(layout, today, known.absent()) for today in of_today):
             return lambda payload: known(**layout.unpack(payload))
         former = _FORMER.get(layout.type)
         if known is not None and former is not None and _extends(layout, former, known.absent()):
@@ -738,12 +771,14 @@ class Counters:
         return self.malformed + self.crc + self.layout
 
 
-def encode(message: Message, sequence: int, tick: int = 0, schema: int = SCHEMA) -> bytes:
-    """A frame with its final 0x00; sequence modulo 2^16. Of a tick beyond 32 bits the message takes the upper ones."""
+def encode(message: Message, sequence: int, tick: int = 0, schema: int | None = None) -> bytes:
+    """A frame with its final 0x00; sequence modulo 2^16; `schema` None: by the message's places, and a board with many
+    parameters takes frames without them of both. Of a tick beyond 32 bits the message takes the upper ones."""
     if tick > 0xFFFFFFFF and hasattr(message, "tick_high"):
         high: dict[str, Any] = {"tick_high": tick >> 32}
         message = replace(message, **high)
-    return encode_raw(message.TYPE, sequence, tick, message.payload, schema)
+    own = SCHEMA if message.places == PLACES else WIDE_SCHEMA
+    return encode_raw(message.TYPE, sequence, tick, message.payload, own if schema is None else schema)
 
 
 def encode_raw(number: int, sequence: int, tick: int, payload: bytes, schema: int = SCHEMA) -> bytes:
@@ -764,7 +799,7 @@ class Decoder:
     """
 
     counters: Counters = field(default_factory=Counters)
-    schemas: dict[int, Readers] = field(default_factory=lambda: {SCHEMA: readers(MESSAGES)})
+    schemas: dict[int, Readers] = field(default_factory=of_boards)
     learns: bool = False
     _pending: bytearray = field(default_factory=bytearray)
     _overflow: int = 0
@@ -872,31 +907,50 @@ class Decoder:
 
 def c_header() -> str:
     """firmware/link/schema.h."""
-    text = SCHEMA_TEXT.split("\n")
+
+    def of_both(narrow: str, wide: str) -> str:
+        return narrow if narrow == wide else f"PVID_LINK_PLACES({narrow}, {wide})"
+
+    both = zip(SCHEMA_TEXT.split("\n"), WIDE_SCHEMA_TEXT.split("\n"), strict=True)
+    text = [of_both(f'"{narrow}\\n"', f'"{wide}\\n"') for narrow, wide in both]
+    text[-1] = text[-1].replace("\\n", "")
     lines = [
         "/* Made by `pvid schema`: do not edit. The fields are explained in host/src/pvid/link/frames.py. */",
         "#ifndef PVID_SCHEMA_H",
         "#define PVID_SCHEMA_H",
         "",
+        '#include "pvid/config.h"',
+        "",
+        "/* Places for parameters in a frame, and what depends on them. */",
+        f"#if PVID_MAX_P > {PLACES}",
+        "#define PVID_LINK_PLACES(narrow, wide) wide",
+        "#else",
+        "#define PVID_LINK_PLACES(narrow, wide) narrow",
+        "#endif",
+        f"#define PVID_LINK_P PVID_LINK_PLACES({PLACES}u, {WIDE}u)",
+        "",
         f"#define PVID_LINK_VERSION {VERSION}u",
         "",
-        "/* CRC-32 of the text. */",
-        f"#define PVID_LINK_SCHEMA 0x{SCHEMA:08X}u",
+        "/* CRC-32 of the text. Frames without parameters are the same in both. */",
+        f"#define PVID_LINK_NARROW_SCHEMA 0x{SCHEMA:08X}u",
+        f"#define PVID_LINK_SCHEMA PVID_LINK_PLACES(PVID_LINK_NARROW_SCHEMA, 0x{WIDE_SCHEMA:08X}u)",
         "",
         "#define PVID_LINK_SCHEMA_TEXT \\",
-        " \\\n".join([*(f'    "{line}\\n"' for line in text[:-1]), f'    "{text[-1]}"']),
+        " \\\n".join(f"    {line}" for line in text),
         "",
         "/* Frame types; offsets of their fields and the bytes before an open end. */",
     ]
     for layout in LAYOUTS.values():
         stem = f"PVID_{layout.name.upper()}"
         lines += ["", f"#define {stem} {layout.type}u"]
-        at = 0
-        for name, kind, count in layout.fields:
-            extent = "" if count == 1 else f"[{count or ''}]"
-            lines.append(f"#define {stem}_{name.upper()} {at}u /* {kind}{extent} */")
+        wide = MESSAGES[layout.type].layout(WIDE)
+        at = wide_at = 0
+        for (name, kind, count), (_, _, more) in zip(layout.fields, wide.fields, strict=True):
+            extent = "" if count == 1 else f"[{count or ''}]" if count == more else f"[{count} or {more}]"
+            lines.append(f"#define {stem}_{name.upper()} {of_both(f'{at}u', f'{wide_at}u')} /* {kind}{extent} */")
             at += _WIRE[kind][1] * (count or 0)
-        lines.append(f"#define {stem}_BYTES {layout.size}u")
+            wide_at += _WIRE[kind][1] * (more or 0)
+        lines.append(f"#define {stem}_BYTES {of_both(f'{layout.size}u', f'{wide.size}u')}")
     for title, enum in (
         ("Status.code", Code),
         ("Hello.form", Form),

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import shown
-from pvid.link.frames import MAX_P, MAX_SAMPLES
+from pvid.link.frames import MAX_SAMPLES, PLACES, WIDE
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]{0,31}"
 _COUNT = re.compile(rf"count ({_NAME}) ([0-9.e+-]{{1,24}})")
@@ -37,7 +37,8 @@ def shown_of_refined(parameters: int, widths: int, in_p: Sequence[int]) -> tuple
     """Entries of the refinement's r that RefinedEstimate has: without the widths, which are first and differ from block
     to block, and without those in p where the others fill its places."""
     found = tuple(range(widths, parameters))
-    return found if len(found) <= MAX_P else tuple(one for one in found if one not in in_p)
+    places = PLACES if len(in_p) <= PLACES else WIDE
+    return found if len(found) <= places else tuple(one for one in found if one not in in_p)
 
 
 class Quantity(NamedTuple):
@@ -100,7 +101,7 @@ class BoardNames:
             if match is None:
                 raise PvidError(f"{shown(line, 60)} names no sample and no parameter")
             found[match[1]].append(Quantity(match[2], match[3] or ""))
-        for what, least, most in (("sample", 1, MAX_SAMPLES), ("p", 1, MAX_P), ("r", 0, MAX_P)):
+        for what, least, most in (("sample", 1, MAX_SAMPLES), ("p", 1, WIDE), ("r", 0, WIDE)):
             named = [name for name, _ in found[what]]
             if not least <= len(named) <= most or len(set(named)) < len(named):
                 raise PvidError(

@@ -27,8 +27,6 @@ from pvid.base.errors import PvidError
 from pvid.link.frames import (
     LONGEST_FRAME,
     MAX_PAYLOAD,
-    MESSAGES,
-    SCHEMA,
     Configure,
     ConfigureQ31,
     Credit,
@@ -41,6 +39,7 @@ from pvid.link.frames import (
     Raw,
     RawCount,
     Status,
+    of_boards,
     readers,
 )
 from pvid.link.tick_count import TickCount
@@ -176,7 +175,7 @@ class LogStream:
     """Bytes of a log in, records out; never raises on garbage, holds no more than a frame and the account."""
 
     def __init__(self) -> None:
-        schemas = {SCHEMA: readers(MESSAGES), LOG_SCHEMA: readers(LOG_MESSAGES)}
+        schemas = of_boards() | {LOG_SCHEMA: readers(LOG_MESSAGES)}
         self.account = Account()
         self.rig: str | None = None
         self.is_log = False  # whether the logger has written into it

@@ -22,7 +22,6 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.link.frames import (
-    MAX_P,
     Code,
     Configure,
     ConfigureQ31,
@@ -313,9 +312,9 @@ class Values:
         return self._one("refined", record, **{**numbers, "stage": stage, "number": item.number, "reason": reason})
 
     def _answers(self, p: npt.NDArray[np.float64], covariance: npt.NDArray[np.float64]) -> dict[str, float]:
-        """Parameters and outputs with their standard errors, from p [MAX_P] and its covariance."""
+        """Parameters and outputs with their standard errors, from p [places] and its covariance."""
         own = [one.name for one in self.mechanism.parameters]
-        names = (self._named_p or own)[: MAX_P if self._hello is None else self._hello.n_p]
+        names = (self._named_p or own)[: len(p) if self._hello is None else self._hello.n_p]
         values = dict(zip(names, p.tolist(), strict=False))
         errors = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=False))
         found = {name: (x, errors[name]) for name, x in values.items() if name in own}
@@ -331,8 +330,8 @@ def is_rate(sample_rate: float) -> bool:
 def in_si(
     item: Estimate | EstimateQ31, hello: Hello | None, phi_offset: float = 0.0
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """p [MAX_P] and its covariance [MAX_P, MAX_P] in SI; zero where the model has no parameter.
+    """p [places] and its covariance [places, places] in SI; zero where the model has no parameter.
 
     Of the fixed-point core: NaN before the board has reported its units; `phi_offset` [rad] is added to its c.
     """
-    return item.in_si(np.full(MAX_P, np.nan) if hello is None else np.array(hello.p_unit), phi_offset)
+    return item.in_si(np.array([] if hello is None else hello.p_unit), phi_offset)

@@ -32,7 +32,6 @@ from pvid.board.stream_image import StreamImage
 from pvid.compare.bits import Difference
 from pvid.core.model_library import compiled_by
 from pvid.link.frames import (
-    MAX_P,
     NO_STANDING,
     Configuration,
     Configure,
@@ -46,6 +45,7 @@ from pvid.link.frames import (
     Raw,
     RawCount,
     RefinedEstimate,
+    pairs,
 )
 from pvid.log.reader import Gap, Record, Restart
 from pvid.log.witness import Core, CoreWitness, Twin, TwinWitness, Witness
@@ -76,7 +76,6 @@ _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
 _PIECE = 2048  # ticks
 _EVERY = 64  # pieces: the twin computes the first of so many as well
 _FIRST = 16_384  # ticks of a session: and the first so many, from its own init on, at least two windows
-_UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
 
 
 @dataclass
@@ -497,14 +496,14 @@ class _Recomputation:
         matrix = witness.matrix
         if not hasattr(check, matrix):
             raise PvidError("the estimates are of another core than the rig file sets")
+        check.refuse_fewer(self.p_names)
         own, n_p = witness.estimate(), len(self.p_names)
-        upper = tuple((a, b) for a, b in _UPPER if b < n_p)
         for i in range(n_p):
             yield self.p_names[i], _word(check.p[i]), _word(own["p"][i])
-        logged = dict(zip(_UPPER, getattr(check, matrix), strict=True))
+        logged = dict(zip(pairs(check.places), getattr(check, matrix), strict=True))
         for i, se in enumerate(getattr(check, "se", ())[:n_p]):  # where the matrix does not hold them
             yield f"standard error of {self.p_names[i]}", _word(se), _word(own["se"][i])
-        for a, b in upper:
+        for a, b in pairs(n_p):
             yield (
                 f"{matrix} of {self.p_names[a]} and {self.p_names[b]}",
                 _word(logged[a, b]),
@@ -521,11 +520,12 @@ class _Recomputation:
         own = witness.refined()
         if own is None:
             raise PvidError("the estimates are of a second stage, which the rig file does not set")
+        check.refuse_fewer(self.p_names)
         n_p, latest = len(self.p_names), own.latest
         for i in range(n_p):
             yield f"published {self.p_names[i]}", _word(check.p[i]), _word(own.best["p"][i])
-        logged = dict(zip(_UPPER, check.covariance, strict=True))
-        for a, b in ((a, b) for a, b in _UPPER if b < n_p):
+        logged = dict(zip(pairs(check.places), check.covariance, strict=True))
+        for a, b in pairs(n_p):
             what = f"published covariance of {self.p_names[a]} and {self.p_names[b]}"
             yield what, _word(logged[a, b]), _word(own.best["covariance"][a, b])
         for name in ("r", "se"):
