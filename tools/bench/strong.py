@@ -124,7 +124,7 @@ def rows(names: Sequence[str], seeds: int, advance: Advance) -> Iterator[tuple[s
                 break
             truth, size = np.asarray(simulation.truth), size_of(simulation)
             errors: list[list[Float]] = [[], []]
-            inside: list[list[Float]] = [[], []]
+            inside: list[list[npt.NDArray[np.bool_]]] = [[], []]
             for seed in range(seeds):
                 run = simulation.run(seed, SOFT)
                 for k, form in enumerate((strong, weak)):

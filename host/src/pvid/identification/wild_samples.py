@@ -125,7 +125,7 @@ def _steady(recording: Recording, model: CompiledModel) -> Mask:
         if one.driven or one.kind == "input":
             u = recording.signals[one.name]
             moved[1:] |= np.abs(np.diff(u)) > _STEADY * (np.nanmax(u) - np.nanmin(u))
-    return np.convolve(moved, np.ones(1 + _LATER))[: len(moved)] == 0
+    return np.asarray(np.convolve(moved, np.ones(1 + _LATER))[: len(moved)] == 0)
 
 
 def _without_far_samples(recording: Recording, signal: Signal, find: Callable[[Float], Mask]) -> tuple[Float, str]:
