@@ -209,6 +209,15 @@ def test_a_long_gap_costs_windows_and_no_answer(name: str, core: str, tmp_path: 
         assert abs(one["value"] - whole["parameters"][parameter]["value"]) < 2 * one["se"], parameter
 
 
+def test_a_piece_behind_a_gap_that_is_too_short_for_a_window_is_named(tmp_path: Path) -> None:
+    recording = recording_of("dc_motor")
+    ticks, rate = len(recording), recording.sample_rate
+    rows = np.delete(np.arange(ticks), np.arange(ticks - 540, ticks - 40))
+    found = answer(write(tmp_path / "run.csv", recording, rows), "--model", "dc_motor")
+    expected = f"identified from one segment of {(ticks - 540) / rate:.3g} s; left out, as too short for a window"
+    assert any(expected in one for one in found["input"])
+
+
 def test_both_cores_and_their_twins_take_gaps_alike(tmp_path: Path) -> None:
     recording = recording_of("heated_plate")
     rows = np.delete(np.arange(len(recording)), np.r_[1200:1201, 1600:1700])

@@ -133,6 +133,8 @@ def _of_segments(recording: Recording, found: Identified) -> tuple[str, ...]:
     for one in used:
         left.remove(one)
     text = f"identified from {len(used)} segments together, of {min(used):.3g} s to {max(used):.3g} s"
+    if len(used) == 1:
+        text = f"identified from one segment of {used[0]:.3g} s"
     if left:
         text += (
             f"; left out, as too short for a window or behind a lost integral: {len(left)}, {sum(left):.3g} s in all"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,7 +108,7 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained, r2: float) -> list[
     relative = lacking.error / np.maximum(np.abs(p), 1e-300)
     worst = [k for k in np.argsort(-relative) if lacking.visible[k]]
     of_visible = of_some(model, [int(k) for k in worst])
-    causes = listed([one.text for one in terms] or ["nothing"])
+    causes = listed(told_once([one.text for one in terms]) or ["nothing"])
     if not found.complete:
         if not worst:
             return []
@@ -130,6 +130,12 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained, r2: float) -> list[
     if terms[0].instead:
         text += f" The run does not distinguish it from these: {listed(terms[0].instead, 'or')}."
     return [Reason(_name_of(found.named[0].chosen), text, alarm=bool(moved), of=of_visible)]
+
+
+def told_once(texts: Sequence[str]) -> list[str]:
+    """Each text once; a lag behind a lag of about the same length is that lag, 2 times."""
+    count = {one: texts.count(one) for one in texts}
+    return [one if many == 1 else f"{one} ({many} times)" for one, many in count.items()]
 
 
 def of_unexplained(model: CompiledModel, found: Uncertainty, lacking: Missing) -> list[Reason]:
