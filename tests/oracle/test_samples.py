@@ -14,6 +14,7 @@ from pvid.model.compiled import CompiledModel
 from pvid.models.drive import RandomSteps
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import Identified, identify
+from pvid.oracle.weak.samples import clipped
 from pvid.sim.simulated_run import RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
@@ -95,6 +96,15 @@ def test_record_of_a_drive_that_clips_is_noted_where_the_equations_do_not_explai
     assert "V stands at its largest value, 4 V, in " in identified[0]["clipped"] and "clipped" not in identified[1]
     steps = motor(1000.0, lambda run: {"V": np.clip(run["V"], -3, 3)})
     assert "clipped" not in steps
+
+
+def test_imposed_current_clips_where_it_comes_to_its_largest_value_steadily_and_not_in_steps() -> None:
+    model, random = simulation_of("battery_2rc").model, np.random.default_rng(1)
+    v = 3.7 + np.cumsum(random.normal(0, 1e-3, 3000))
+    levels = random.normal(0, 2, 200).repeat(15)
+    swing = np.clip(3 * np.sin(np.arange(3000) / 40), -9, 2)
+    for i, names in ((levels, []), (swing, ["clipped"])):
+        assert [one.name for one in clipped(model, model.signal("i"), {"v": v, "i": i})] == names
 
 
 def flywheel() -> CompiledModel:

@@ -109,10 +109,10 @@ class Frozen:
     ----------
     name : of its command, at the commit in the heads of its tables
     claim, tables : as those of a case
-    holder : the tests of what the claim still promises of the code of today; none where it compares with others
+    holder : the tests of what the claim still promises of the code of today
     """
 
     name: str
     claim: str
     tables: tuple[str, ...]
-    holder: str = "frozen"
+    holder: str

@@ -144,6 +144,18 @@ CASES = (
         ),
     ),
     Case(
+        "peers",
+        "pvid beside SciPy, CasADi, pysindy, PyBOP, MuJoCo, Pinocchio and the textbook, on the same recordings.",
+        "peers.compare",
+        ("peers",),
+        (
+            option("--seeds", 20, "Recordings of each row."),
+            option("--seconds", 30, "Of the processor for a row: the next recording is left out."),
+            click.Option(["--tool"], multiple=True, help="A file of tools/bench/peers. Default: all."),
+            click.Option(["--mechanism"], multiple=True, help="Default: all."),
+        ),
+    ),
+    Case(
         "fuzz-link",
         "The C side of the serial link under libFuzzer, with sanitizers (needs clang).",
         "fuzz:link_report",
@@ -178,11 +190,6 @@ FROZEN = (
         "Corrupted frames of every length against both decoders of the serial link.",
         ("codec",),
         "tests/link/test_link.py",
-    ),
-    Frozen(
-        "compare-methods",
-        "Weak form, strong form, output error and pysindy's weak form on the same runs.",
-        ("compare-methods",),
     ),
     Frozen(
         "cycles",

@@ -1,4 +1,4 @@
-"""The page host/docs/benchmarks.md: four figures, and sentences with figures, from the tables of results beside it."""
+"""The page host/docs/benchmarks.md: five figures, and sentences with figures, from the tables of results beside it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ DATA = PAGE.with_suffix("")
 IMAGES = ROOT / "host" / "docs" / "images" / "benchmarks"
 WEAK, REFINED, BAD, OTHER = "C0", "C2", "C3", "0.6"
 _DPI = 80
-_TOO_FAR = 100.0  # a cell "> 100"
 
 
 def results_of(name: str) -> Results:
@@ -38,7 +37,7 @@ def sums_of(name: str) -> dict[str, int]:
 
 
 def _number(cell: str) -> float:
-    return _TOO_FAR if cell.startswith(">") else float(cell.split()[0])
+    return float(cell.removeprefix("> ").split()[0])
 
 
 def _numbers(cells: Sequence[str]) -> list[float]:
@@ -277,6 +276,62 @@ def of_robustness() -> list[str]:
     ]
 
 
+# ---- other tools
+
+
+def _of_tools() -> list[tuple[str, list[dict[str, str]], list[dict[str, str]]]]:
+    """Of each tool the rows as modelled and those with an effect more, where it could be had."""
+    table = [row for row in results_of("peers").where() if not row["answered"].startswith("not")]
+    parts = []
+    for tool in _names([row["tool"] for row in table]):
+        own = [row for row in table if row["tool"] == tool]
+        parts.append((tool, [row for row in own if row["recording"] == "as modelled"],
+                      [row for row in own if row["recording"] != "as modelled"]))  # fmt: skip
+    return parts
+
+
+def draw_peers(figure: Figure) -> None:
+    """Worst error of each tool on each mechanism, and how often it reports an effect that the model lacks."""
+    left, right = figure.subplots(1, 2, sharey=True)
+    tools = [tool for tool, _, _ in _of_tools()]
+    for number, name in enumerate(_names(results_of("peers").column("mechanism"))):
+        found = [(_number(row["worst %"]), tool) for tool, clean, _ in _of_tools() for row in clean
+                 if row["mechanism"] == name]  # fmt: skip
+        left.plot(*zip(*found, strict=True), "o", color=f"C{number}", alpha=0.7, label=name)
+    left.set_xscale("log")
+    left.set_xlabel("worst error as modelled, %")
+    left.legend(fontsize="small")
+    right.barh(tools, [_share(lacking, "warned") for _, _, lacking in _of_tools()], color=WEAK)
+    right.set_xlabel("runs in which a missing effect is reported, %")
+    right.invert_yaxis()
+
+
+def _share(rows: Sequence[dict[str, str]], name: str) -> float:
+    return 100 * sum(int(row[name]) for row in rows) / max(sum(_runs(row) for row in rows), 1)
+
+
+def _runs(row: dict[str, str]) -> int:
+    return int(row["answered"].split(" of ")[1])
+
+
+def _span(numbers: Sequence[float]) -> str:
+    return " to ".join(dict.fromkeys(f"{one:.2g}" for one in (min(numbers), max(numbers))))
+
+
+def of_peers() -> list[str]:
+    """Sentences below the figure."""
+    lines = []
+    for tool, clean, lacking in _of_tools():
+        middle, seconds = (_numbers([row[name] for row in clean]) for name in ("median %", "CPU s a run"))
+        known = [(float(row["in 2 s.e. %"]), _runs(row)) for row in clean if row["in 2 s.e. %"] != "-"]
+        share = _share(lacking, "warned")
+        parts = [f"{_span(middle)} %, worst {max(_numbers([row['worst %'] for row in clean])):.2g} %"]
+        parts += [f"coverage {sum(a * b for a, b in known) / sum(b for _, b in known):.0f} %"] if known else []
+        parts += [f"reports {share:.0f} %"] if share else []
+        lines.append(f"- {tool}: {'; '.join([*parts, f'{_span(seconds)} s'])}.")
+    return lines
+
+
 # ---- the page
 
 
@@ -314,6 +369,7 @@ PARTS = (
     Part("cost", ("model-boards", "sizes-models"), draw_cost, of_cost),
     Part("missing", (CAMPAIGNS[0],), draw_missing, of_missing, (9.0, 3.4)),
     Part("robustness", ("accidents",), draw_robustness, of_robustness, (9.0, 4.6)),
+    Part("peers", ("peers",), draw_peers, of_peers, (9.0, 3.6)),
 )
 
 

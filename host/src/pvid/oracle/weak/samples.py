@@ -93,7 +93,7 @@ def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) 
             if end - first < _HELD or first < _APPROACH:
                 continue
             speed = abs(limit - x[first - _APPROACH]) / _APPROACH
-            if signal.kind == "input" and np.any(np.diff(x[first - _APPROACH : first]) == 0):
+            if signal.driven and np.any(np.diff(x[first - _APPROACH : first]) == 0):
                 continue
             moving = inertial or any(np.ptp(y[first:end]) > _MOVES * float(np.nanmax(y) - np.nanmin(y)) for y in others)
             if moving and speed * (end - first) / 2 > _BEYOND * step:
