@@ -150,6 +150,18 @@ def test_from_a_file_to_an_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert "2 joints" in report and "No torque depends on" in report
     answer = run("identify", "log.csv", "--model", "arm.py", "--validate", "log.csv")
     assert "predicts torques that were not fitted: tau1" in answer and "log.csv: the answer predicts tau1" in answer
+    np.savetxt(
+        "empty.csv",
+        np.array(list(robot_arms.log_of(chain, 2).values())).T,
+        delimiter=",",
+        header=",".join(robot_arms.log_of(chain, 2)),
+        comments="",
+    )
+    assert "payload m: " in run("identify", "log.csv", "--model", "arm.py", "--without", "empty.csv")
+    told = CliRunner().invoke(
+        commands, ["identify", "log.csv", "--model", "dc_motor", "--without", "empty.csv"], standalone_mode=False
+    )
+    assert "--without is for the payload of a robot, which dc_motor is not" in str(told.exception)
     assert re.search(r"Fc2 \[N\*m\] +│ +(1.0\d*|0.99\d*) ", answer), answer
 
 

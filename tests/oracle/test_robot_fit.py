@@ -11,7 +11,7 @@ import pytest
 import robot_arms
 
 from pvid.base.errors import PvidError
-from pvid.identification.robot import answer_of_robot
+from pvid.identification.robot import RobotAnswer, answer_of_robot, payload_of
 from pvid.model import Robot
 from pvid.model.chain import Chain
 from pvid.model.compiled import CompiledModel
@@ -54,6 +54,42 @@ def test_standard_errors_cover_the_truth() -> None:
     assert np.mean(np.abs(off) < 2) > 0.90 and 0.8 < np.sqrt(np.mean(off**2)) < 1.2
     # The errors are those of a fit, not of anything: the twist of the first joint is known to 1 %.
     assert max(np.sqrt(one.covariance[0, 0]) / abs(truth_of(SPATIAL)[0]) for one in found) < 0.01
+
+
+def _answer(chain: Chain, seed: int, model: CompiledModel) -> RobotAnswer:
+    log = robot_arms.log_of(chain, seed)
+    return answer_of_robot(Recording(log.pop("t"), log, RATE), model)
+
+
+def test_a_payload_is_the_difference_of_two_recordings() -> None:
+    model, inner = model_of(SPATIAL), SPATIAL.joints[-1].inertial
+    assert inner is not None
+    mass, centre, about = 0.8, np.array([0.1, 0.05, 0.2]), np.array([0.01, 0.001, 0.002, 0.012, -0.001, 0.008])
+    moved = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))[np.triu_indices(3)]
+    carried = tuple(np.array(inner) + [mass, *(mass * centre), *(about + moved)])
+    chain = Chain((*SPATIAL.joints[:-1], replace(SPATIAL.joints[-1], inertial=carried)), SPATIAL.gravity)
+    truth = dict(
+        zip(("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"), [mass, *centre, *about], strict=True)
+    )
+    off = []
+    for seed in range(8):
+        found = payload_of(_answer(chain, seed, model), _answer(SPATIAL, seed + 50, model))
+        off += [(one.value - truth[name]) / one.se_noise for name, one in found.items() if one.value and one.se_noise]
+    assert len(off) == 80  # all ten of each
+    assert np.mean(np.abs(off) < 2) > 0.85 and np.sqrt(np.mean(np.square(off))) < 1.3  # of 20 runs: 95 % and 1.04
+
+
+def test_what_two_motions_do_not_show_of_a_payload_has_no_value() -> None:
+    model, empty = model_of(SPATIAL), _answer(SPATIAL, 1, model_of(SPATIAL))
+    none = payload_of(empty, _answer(SPATIAL, 2, model))
+    assert [name for name, one in none.items() if one.value is not None] == ["m"] and abs(none["m"].value or 0) < 0.01
+    one = robot_arms.arm("spatial", seed=5)
+    one = Chain(one.joints[:1], one.gravity)
+    found = payload_of(_answer(one, 1, model_of(one)), _answer(one, 2, model_of(one)))
+    assert all(it.value is None for it in found.values())  # one upright axis: its moment of inertia alone
+    lost = replace(empty, fit=replace(empty.fit, undetermined=np.ones(len(empty.fit.p), np.bool_)))
+    with pytest.raises(PvidError, match="no payload: the motions determine no common parameter"):
+        payload_of(lost, empty)
 
 
 def test_friction_that_is_soft_near_a_reversal_does_no_harm() -> None:

@@ -57,6 +57,13 @@ from pvid.settings.cores import FLOAT
     "separate without this option.",
 )
 @click.option("--shared", metavar="NAME,...", multiple=True, help="Offsets of sensors with the same value in all RUNs.")
+@click.option(
+    "--without",
+    "empty",
+    metavar="RUN0",
+    type=click.Path(path_type=Path),
+    help="Of a robot: RUN0 is without its payload, whose mass, centre and inertia are then identified.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--report", type=NewFile(), help="Write a report: one HTML page with the answer in words and pictures.")
 @click.option(
@@ -78,6 +85,7 @@ def command(
     add: tuple[str, ...],
     write_model: Path | None,
     other: Path | None,
+    empty: Path | None,
     own: tuple[str, ...],
     shared: tuple[str, ...],
     as_json: bool,
@@ -132,6 +140,7 @@ def command(
         weights=weights or "residuals",
         refine=refine,
         other=other,
+        empty=empty,
         add=add,
         write_model=write_model,
         own=listed_names(own),

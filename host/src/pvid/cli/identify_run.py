@@ -76,6 +76,7 @@ def identify_run(
     refine: bool | None = None,
     on: str | None = None,
     other: Path | None = None,
+    empty: Path | None = None,
     add: Sequence[str] = (),
     write_model: Path | None = None,
     own: Sequence[str] = (),
@@ -91,6 +92,7 @@ def identify_run(
     weights : of the rows, as in pvid.oracle.weak.identify
     refine : the equations are fitted to the whole run, from the answer on; None: as of pvid.identification.road
     other : another recording, of which is said how well the answer predicts it
+    empty : a recording of a robot without its payload
     add, write_model : terms that are added to the model, and where the model file with them is written
     own, shared : unknowns that each recording has of its own, or not, as in pvid.identification.analysis.own_of
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
@@ -102,7 +104,9 @@ def identify_run(
         asked |= {"--weights": weights != "residuals", "--figure": pictures.figure, "--report": pictures.report}
         asked["--write-model"] = write_model
         asked |= {f"--{option} {value}": value for option, value in only_in_c.items()}
-        return _identified_robot(paths, rig, columns, other, asked, as_json=as_json)
+        return _identified_robot(paths, rig, columns, other, empty, asked, as_json=as_json)
+    if empty is not None:
+        raise PvidError(f"--without is for the payload of a robot, which {name} is not: omit it")
     if len(paths) > 1:
         _refuse_several(on=on, refine=bool(refine), **only_in_c)
     if only_in_c.get("form") == STRONG_FORM:
@@ -183,12 +187,13 @@ def _identified_robot(
     rig: MechanismRig,
     columns: str | None,
     other: Path | None,
+    empty: Path | None,
     asked: Mapping[str, Any],
     *,
     as_json: bool,
 ) -> int:
     """Identifies recordings of a robot and prints the answer."""
-    from pvid.identification.robot import answer_of_robot
+    from pvid.identification.robot import answer_of_robot, payload_of
 
     for option, value in asked.items():
         if value and option not in ("--core f64", "--form weak"):
@@ -202,6 +207,14 @@ def _identified_robot(
         found = answer.predicts(recordings_of([other], rig, columns)[0])
         more = {"validation": {"prediction": {one.name: one.as_json() for one in found}}}
         lines = [f"{other}: the answer predicts {listed(found)}"]
+    if empty is not None:
+        payload = payload_of(answer, answer_of_robot(recordings_of([empty], rig, columns)[0], model))
+        more["payload"] = _values_json(payload)
+        known = {
+            name: with_error(one.value, one.se) for name, one in payload.items() if one.value is not None and one.se
+        }
+        lines += [f"payload {name}: {value} +- {se} {payload[name].unit}" for name, (value, se) in known.items()]
+        lines += [f"payload {name}: {one.reason}" for name, one in payload.items() if name not in known]
     return _told(answer, as_json=as_json, more=more, lines=lines)
 
 

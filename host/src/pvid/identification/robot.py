@@ -14,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.identification.answer import Answer, Factors, Float, Value
 from pvid.identification.sensor_prediction import SensorPrediction
+from pvid.model.chain import INERTIAL
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.robot import RobotFit, RobotRun, identify_robot
 from pvid.oracle.weak.verdict import Reason, Verdict
@@ -23,6 +24,9 @@ _CLASH = 4.5  # standard errors between the halves: one of 60 parameters is as f
 _STILL = 0.14  # of the samples: 13 bits, 500 Hz, 0.8 rad/s; of 10 runs each 89 % of the values are within two standard
 # errors there and 83 % with 12 bits
 _SOFT = 5.0  # of Student's t: friction as modelled has up to 3.8 in 60 joints
+_SEEN = 1e-6  # relative size of a direction that the torques depend on
+_CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
+_PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _EXPLAINED = 0.9  # R^2 of a torque below which the equations do not explain it
 
 
@@ -133,10 +137,7 @@ class RobotAnswer(Answer):
 def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
     """Base parameters of a robot from all segments of a recording. Raises PvidError when the recording is too short."""
     fit = identify_robot(model, recording.run, recording.sample_rate)
-    signals = {one.name: one.gain_sd for one in model.signals if one.kind == "input"}
-    constants = {one.name: one.sd / abs(one.value) for one in model.knowns if one.value}
-    gains = np.array([math.hypot(sd, constants.get(f"kt{k + 1}", 0.0)) for k, sd in enumerate(signals.values())])
-    scale: Float = gains[:, np.newaxis] * fit.by_gain
+    scale: Float = _gains(model)[:, np.newaxis] * fit.by_gain
     sizes, directions = np.linalg.eigh(fit.covariance)
     noise = directions * np.sqrt(np.maximum(sizes, 0.0))
     values = {}
@@ -154,6 +155,71 @@ def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
             factors=factors,
         )  # fmt: skip
     return RobotAnswer(model, fit, values, recording)
+
+
+def _gains(model: CompiledModel) -> Float:
+    """Relative standard deviations of the torques [n]."""
+    signals = [one.gain_sd for one in model.signals if one.kind == "input"]
+    constants = {one.name: one.sd / abs(one.value) for one in model.knowns if one.value}
+    return np.array([math.hypot(sd, constants.get(f"kt{k + 1}", 0.0)) for k, sd in enumerate(signals)])
+
+
+def payload_of(loaded: RobotAnswer, empty: RobotAnswer) -> dict[str, Value]:
+    """What the last body carries in one recording and not in the other: mass m, centre c in the frame of that body, and
+    inertia about this centre; from the difference of the base parameters of the bodies.
+
+    Raises
+    ------
+    PvidError
+        Where the motions determine no base parameter of the bodies in common.
+    """
+    chain = loaded.model.chain
+    assert chain is not None
+    last = [k for k, one in enumerate(chain.standard) if one.joint == len(chain.joints) - 1 and one.kind in INERTIAL]
+    last.sort(key=lambda k: INERTIAL.index(chain.standard[k].kind))
+    lost = loaded.fit.undetermined | empty.fit.undetermined
+    own = [k for k, one in enumerate(chain.base) if chain.standard[one.standard].kind in INERTIAL and not lost[k]]
+    if not own:
+        raise PvidError("no payload: the motions determine no common parameter of the bodies: move all joints in both")
+    shares = np.array([[dict(chain.base[k].parts).get(one, 0.0) for one in last] for k in own])
+    covariance = (loaded.fit.covariance + empty.fit.covariance)[np.ix_(own, own)]
+    roots = np.linalg.inv(np.linalg.cholesky(covariance))
+    sizes = np.linalg.norm(roots @ shares, axis=0)
+    sizes = 1 / np.where(sizes > 0, sizes, 1.0)
+    seen, values, directions = np.linalg.svd(roots @ shares * sizes, full_matrices=True)
+    rank = int(np.sum(values > _SEEN * values[0]))
+    inverse = sizes[:, np.newaxis] * (directions[:rank].T / values[:rank]) @ seen[:, :rank].T @ roots
+    hidden = sizes[:, np.newaxis] * directions[rank:].T
+    of = inverse @ (loaded.fit.p - empty.fit.p)[own]
+    faint = bool(abs(of[0]) < _CLEAR_MASS * math.sqrt((inverse @ covariance @ inverse.T)[0, 0]))
+    of[0] = of[0] or 1e-9  # of two recordings without a difference; it is faint
+    tiny = 1e-30
+    slopes = np.array([_about_centre(of + 1j * tiny * one).imag / tiny for one in np.eye(10)]).T
+    noise = np.sqrt(np.einsum("ij,jk,ik->i", slopes @ inverse, covariance, slopes @ inverse))
+    gains = _gains(loaded.model)[:, np.newaxis] * (loaded.fit.by_gain - empty.fit.by_gain)[:, own]
+    scale = np.linalg.norm(slopes @ inverse @ gains.T, axis=1)
+    dark = np.linalg.norm(slopes @ hidden, axis=1) > _SEEN * np.linalg.norm(slopes * sizes, axis=1)
+    dark[1:] |= dark[0]
+    for k, name in enumerate(_PAYLOAD[4:], 4):  # Ixx about the centre contains cy and cz, Ixy cx and cy
+        axes = set(name[1:]) if name[1] != name[2] else set("xyz") - {name[1]}
+        dark[k] |= any(dark[1 + "xyz".index(one)] for one in axes)
+    units, out = {"m": "kg", "c": "m", "I": "kg*m^2"}, {}
+    for k, (name, value) in enumerate(zip(_PAYLOAD, _about_centre(of), strict=True)):
+        unit = units[name[0]]
+        if dark[k] or (faint and k):
+            why = "no torque depends on it alone" if dark[k] else "there is no mass that is clear of its error"
+            out[name] = Value(unit, None, None, None, "not_identified", why)
+        else:
+            total = math.hypot(noise[k], scale[k])
+            out[name] = Value(unit, float(value), total, float(noise[k]), se_scale=float(scale[k]), se_model=0.0)
+    return out
+
+
+def _about_centre(of: Any) -> Any:
+    """m, c and I about c, from m, m c and I about the origin [10]."""
+    c = of[1:4] / of[0]
+    about = of[0] * (np.sum(c * c) * np.eye(3) - np.outer(c, c))
+    return np.concatenate([of[:1], c, of[4:] - about[np.triu_indices(3)]])
 
 
 def torques_of(
