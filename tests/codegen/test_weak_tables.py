@@ -76,7 +76,7 @@ class Emulation:
             oracle = self.form.rows.record.arguments[len(jets) + k]
             given[f"run_{k}"] = whole + oracle[0]
         for k, v in enumerate(signs):
-            given[f"sgn_of_{k}"] = averaged(v).values
+            given[f"sgn_of_{k}"] = averaged(v, 0.0, np.zeros(1)).values
         both = self._called(self.form.made.values.expressions, given)
         return np.array(both[: self.model.gains]), np.array(both[self.model.gains :])
 

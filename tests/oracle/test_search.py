@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pvid.identification.core import identify_in_c
+from pvid.identification.road import identified
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak import reversals
 from pvid.oracle.weak.blur import blur_of, rates_of_drives
@@ -15,6 +17,8 @@ from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.rows import WeakRows, WhiteRows
 from pvid.oracle.weak.shared import neglected
 from pvid.oracle.weak.starts import starts_about
+from pvid.rig.run import Recording
+from pvid.settings.enums import Core
 from pvid.sim.simulated_run import simulation_of
 
 PENDULUM = ready(compiled_of("kapitza"))
@@ -109,3 +113,16 @@ def test_a_mechanism_that_comes_to_rest_is_identified_from_its_motion(name: str,
     assert all(one.status == "identified" for one in found.judged)
     assert np.all(np.abs(found.p - simulation.truth) < 4 * found.se)
     assert sum(one.reversals for one in found.fit.rows.record.signs) < 200
+
+
+@pytest.mark.parametrize("core", ["f32", "q31"])
+@pytest.mark.parametrize(("name", "seconds"), [("coast_down", 300.0), ("coasting_motor", 12.0)])
+def test_the_design_of_a_core_is_for_the_motion_before_the_rest(name: str, seconds: float, core: Core) -> None:
+    shipped = simulation_of(name)
+    run = replace(shipped, rig=replace(shipped.rig, duration=seconds), _motions={}).run(3)
+    answer = identified(Recording(run.pop("t"), run, shipped.rig.sample_rate), shipped.model, refine=False)
+    found = identify_in_c(answer, core)
+    assert found.published and found.misfit == pytest.approx(1.0, abs=0.3)
+    for name, true in zip(shipped.model.p_names, shipped.truth, strict=True):
+        one = found.values[name]
+        assert one.se is not None and abs(one.value - true) < 4 * one.se and one.se < 0.03 * true

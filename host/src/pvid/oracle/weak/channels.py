@@ -302,8 +302,7 @@ class Channels:
         design = grid.design
         if design.reversals == "soft":
             return reversals.soft(v, design.soft)
-        if design.reversals == "averaged":
-            return reversals.averaged(v)
+        of_core = design.reversals in ("averaged", "decided")
         weights = self._sign_slopes[argument]
         straight = all(one.is_number for one in weights.values()) and all(jet.order == 1 for jet in weights)
         gain = design.weights(1)
@@ -325,8 +324,8 @@ class Channels:
                 while len(self._positions) > _KEPT:
                     del self._positions[next(iter(self._positions))]
             raw, blur = self._positions[key]
-            if design.reversals == "decided":
-                return reversals.decided(v, sd * per_sensor, blur)
+            if of_core:
+                return reversals.averaged(v, sd * per_sensor, blur)
             if (*key, piece) not in self._located:
                 self._located[*key, piece] = reversals.located(v, sd * per_sensor, blur, piece, raw)
                 while len(self._located) > _KEPT:
@@ -339,8 +338,8 @@ class Channels:
             slope = self.function([one])(*[grid.jets.get(x, 0.0) for x in self.plain])[0]
             of_signal = float(np.sum(design.weights(jet.order) ** 2)) * self.model.signal(jet.of).sd ** 2
             variance += float(np.mean(np.square(slope))) * of_signal
-        if design.reversals == "decided":
-            return reversals.decided(v, variance**0.5, np.zeros(v.shape))
+        if of_core:
+            return reversals.averaged(v, variance**0.5, np.zeros(v.shape))
         return reversals.located(v, variance**0.5, np.zeros(v.shape), piece)
 
 

@@ -8,7 +8,7 @@ around it get the values with which the sum equals the integral of sgn(v) g(t) f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +36,7 @@ class Signs:
     reversals : how many of the times are such
     stuck : steps at which the sign stays in doubt for longer than a piece [n]
     slopes : d values / d v of a soft sign, for the noise of v [n]
-    limit : of |v|, up to which an averaged sign is in doubt, "decided" ones alone
+    limit : of |v|, up to which an averaged sign is in doubt
     """
 
     values: Float
@@ -71,17 +71,12 @@ def soft(v: Float, width: float) -> Signs:
     return Signs(values, none, none, 0, np.zeros(v.shape, bool), (1 - values**2) / width)
 
 
-def averaged(v: Float) -> Signs:
-    """Mean of sgn over each step, v linear there."""
+def averaged(v: Float, sd_v: float, blur: Float) -> Signs:
+    """Mean of sgn over each step, v linear there, and the steps at which the sign is in doubt: `stuck`."""
     none = np.zeros(0)
     values = np.clip(2 * v / (np.abs(np.gradient(v)) + 1e-300), -1, 1)
-    return Signs(values, none, none, 0, np.zeros(v.shape, bool), np.zeros(v.shape))
-
-
-def decided(v: Float, sd_v: float, blur: Float) -> Signs:
-    """The same, with the steps at which the sign is in doubt: `stuck`."""
     limit = _NOISES * sd_v + float(blur.max(initial=0.0))
-    return replace(averaged(v), stuck=np.abs(v) <= limit, limit=limit)
+    return Signs(values, none, none, 0, np.abs(v) <= limit, np.zeros(v.shape), limit)
 
 
 def correction(f: Float) -> Float:
