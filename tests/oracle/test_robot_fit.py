@@ -15,7 +15,7 @@ from pvid.identification.robot import RobotAnswer, answer_of_robot, payload_of
 from pvid.model import Robot
 from pvid.model.chain import Chain
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.weak.robot import RobotFit, RobotRun, identify_robot
+from pvid.oracle.weak.robot import LAWS, RobotFit, RobotRun, identify_robot
 from pvid.rig.run import Recording
 
 RATE = 500.0
@@ -102,6 +102,33 @@ def test_friction_that_is_soft_at_higher_speeds_is_doubted() -> None:
     assert np.abs(off_by(fits(6, soft=0.1), "p")).max() > 5  # the standard errors do not hold
     assert widths[0.0].max() < 5.0  # as of _SOFT: Student's t of 18 windows once in 10 000
     assert np.mean(widths[0.05] > 5.0) > 0.5 and np.mean(widths[0.1] > 5.0) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("joint", "size", "law", "text"),
+    [
+        (3, 0.3, "1", "joint 3 has what the equations lack, 0.3"),
+        (2, 4.0, "q", "joint 2 has what the equations lack, 3.9"),
+        (1, 0.3, "abs(v)*v", "joint 1 has what the equations lack, 0.3"),
+    ],
+)
+def test_what_a_joint_has_beside_the_equations_is_named_and_in_the_errors(
+    joint: int, size: float, law: str, text: str
+) -> None:
+    """Without it a parameter is 17 to 36 standard errors of noise off."""
+    log = robot_arms.log_of(SPATIAL, 0)
+    _, q, v, _ = robot_arms.motion(3, 20.0, RATE, 0)
+    log[f"tau{joint}"] += size * LAWS[law](q, v)[joint - 1]
+    found = answer_of_robot(Recording(log.pop("t"), log, RATE), model_of(SPATIAL))
+    values = [found.values[name] for name in found.model.p_names]
+    off = np.array([one.value for one in values]) - truth_of(SPATIAL)
+    assert np.max(np.abs(off) / [one.se_noise or 0.0 for one in values]) > 15
+    assert np.max(np.abs(off) / [one.se or 0.0 for one in values]) < 3
+    assert text in " ".join(one.text for one in found.verdict.reasons) and found.verdict.word == "usable"
+
+
+def test_without_that_no_term_is_named() -> None:
+    assert max(abs(one.lacking[0].t) for one in fits(6)) < 5.0
 
 
 def test_noise_of_the_encoders_biases_and_the_bias_is_taken_off() -> None:

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import listed
+from pvid.base.wording import listed, with_unit
 from pvid.identification.answer import Answer, Factors, Float, Value
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.chain import INERTIAL
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.weak.robot import RobotFit, RobotRun, identify_robot
+from pvid.oracle.weak.robot import Lacking, RobotFit, RobotRun, identify_robot
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 
@@ -24,6 +24,14 @@ _CLASH = 4.5  # standard errors between the halves: one of 60 parameters is as f
 _STILL = 0.14  # of the samples: 13 bits, 500 Hz, 0.8 rad/s; of 10 runs each 89 % of the values are within two standard
 # errors there and 83 % with 12 bits
 _SOFT = 5.0  # of Student's t: friction as modelled has up to 3.8 in 60 joints
+_SURE = 5.0  # of Student's t of a term that is missing: without one the largest of 9 has been 3.4 in 8 recordings
+_MOVES = 2.0  # standard errors of noise: what a term must move a parameter by for a warning
+_WORDS = {
+    "q": "{size} * q{joint}: a spring, a cable, or a wrong gear",
+    "1": "{size} at all times: an offset of its sensor, or a load",
+    "abs(v)*v": "{size} * abs(v)*v of its rate v: drag",
+}
+_UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2"}
 _SEEN = 1e-6  # relative size of a direction that the torques depend on
 _CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
 _PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -95,6 +103,17 @@ class RobotAnswer(Answer):
                 "small; move faster"
             )
             reasons.append(Reason("friction", text))
+        if (one := surest(fit)) is not None:
+            sd = np.sqrt(np.diag(fit.covariance))
+            moved = [k for k in np.argsort(-np.abs(one.shift) / sd) if abs(one.shift[k]) > _MOVES * sd[k]]
+            slides = self.model.chain is not None and self.model.chain.joints[one.joint].prismatic
+            unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")
+            size = _WORDS[one.law].format(size=with_unit(one.size, unit, 3), joint=one.joint + 1)
+            text = f"the torque of joint {one.joint + 1} has what the equations lack, {size}"
+            if moved:
+                k = moved[0]
+                text += f"; with that {names[k]} would be {fit.p[k] + one.shift[k]:.4g} in place of {fit.p[k]:.4g}"
+            reasons.append(Reason("missing", text, alarm=bool(moved), of=tuple(names[k] for k in moved)))
         weak = [one.name for one in self.prediction if one.r2 < _EXPLAINED]
         if weak:
             text = (
@@ -134,12 +153,19 @@ class RobotAnswer(Answer):
         }
 
 
+def surest(fit: RobotFit) -> Lacking | None:
+    """The term that is missing, if one is."""
+    return fit.lacking[0] if fit.lacking and abs(fit.lacking[0].t) > _SURE else None
+
+
 def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
     """Base parameters of a robot from all segments of a recording. Raises PvidError when the recording is too short."""
     fit = identify_robot(model, recording.run, recording.sample_rate)
     scale: Float = _gains(model)[:, np.newaxis] * fit.by_gain
     sizes, directions = np.linalg.eigh(fit.covariance)
     noise = directions * np.sqrt(np.maximum(sizes, 0.0))
+    lacking = surest(fit)
+    change = np.zeros((0, len(fit.p))) if lacking is None else lacking.shift[np.newaxis]
     values = {}
     for k, unknown in enumerate(model.unknowns):
         if fit.undetermined[k]:
@@ -148,10 +174,10 @@ def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
                 word="not_identified",
             )  # fmt: skip
             continue
-        parts = [float(np.linalg.norm(one)) for one in (noise[k], scale[:, k])]
-        factors = Factors(noise[k], scale[:, k], np.zeros(0))
+        parts = [float(np.linalg.norm(one)) for one in (noise[k], scale[:, k], change[:, k])]
+        factors = Factors(noise[k], scale[:, k], change[:, k])
         values[unknown.name] = Value(
-            unknown.unit, float(fit.p[k]), math.hypot(*parts), parts[0], se_scale=parts[1], se_model=0.0,
+            unknown.unit, float(fit.p[k]), math.hypot(*parts), parts[0], se_scale=parts[1], se_model=parts[2],
             factors=factors,
         )  # fmt: skip
     return RobotAnswer(model, fit, values, recording)

@@ -14,7 +14,7 @@ off (simulation extrapolation: J. Cook, L. Stefanski, JASA 89 (1994) 1314).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -48,6 +48,11 @@ _REACHED = 1e-6  # of the energy of a direction: what slow steps have of it
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
 _MOST_BYTES = 4e9  # of the rows, with what is computed from them
 _DIRECTION = 1e-6  # relative size of a direction that is one
+LAWS: Mapping[str, Callable[[Float, Float], Float]] = {  # of a joint's position and rate
+    "q": lambda q, v: q,
+    "1": lambda q, v: np.ones(q.shape),
+    "abs(v)*v": lambda q, v: np.abs(v) * v,
+}
 
 
 @dataclass(frozen=True)
@@ -206,6 +211,7 @@ class RobotRows:
     Attributes
     ----------
     regressors, known : of each joint [n, windows, p, K] and its torque [n, windows, K]
+    others : of each law of LAWS, which the equations do not have [laws, n, windows, K]
     doubts : directions that do not count [n, windows, K, ..]
     next : of each window but the last, whether the one behind it overlaps it [windows - 1]
     free : part of the rows that counts, of each joint [n]
@@ -213,6 +219,7 @@ class RobotRows:
 
     regressors: Float
     known: Float
+    others: Float
     doubts: Float
     next: npt.NDArray[np.bool_]
     free: Float
@@ -233,7 +240,7 @@ class RobotRows:
         tables = [functions.combine(0), -functions.combine(1)]
         weights = polynomial_weights(run.design.taps, _DEGREE, 1) * run.sample_rate
         noise = run.design.sd * float(np.linalg.norm(weights))
-        parts, known, doubts, follows = [], [], [], []
+        parts, known, others, doubts, follows = [], [], [], [], []
         for segment in run.values(columns, max(_STEPS // hop, 1) * hop, seed, sign):
             halves = [functions.half_sums(functions.halves(one)) for one in segment.pieces()]
             whole = np.concatenate(halves, axis=1)
@@ -243,6 +250,8 @@ class RobotRows:
                 own[joint, :, place] += one @ tables[order]
             parts.append(own)
             known.append(functions.window_sums(segment.torque) @ tables[0])
+            laws = [of(segment.position, segment.rate) for of in LAWS.values()]
+            others.append(np.array([functions.window_sums(one) @ tables[0] for one in laws]))
             doubts.append(np.array([_doubts(*one, functions) for one in zip(segment.rate, noise, strict=True)]))
             follows += [*([True] * (sums.shape[1] - 1)), False]
         if sum(one.shape[1] for one in parts) < _FEWEST_WINDOWS:
@@ -250,7 +259,7 @@ class RobotRows:
                 f"the run has fewer than {_FEWEST_WINDOWS} windows of {functions.length:.3g} s: record longer"
             )
         x, y, away = (np.concatenate(one, axis=1) for one in (parts, known, doubts))
-        return cls(x, y, away, np.array(follows[:-1], np.bool_), np.ones(n))
+        return cls(x, y, np.concatenate(others, axis=2), away, np.array(follows[:-1], np.bool_), np.ones(n))
 
     @property
     def windows(self) -> int:
@@ -266,8 +275,9 @@ class RobotRows:
         roots = left @ roots[:, np.newaxis]
         x = np.einsum("iwpk,iwjk->iwpj", self.regressors, roots, optimize=True)
         y = np.einsum("iwk,iwjk->iwj", self.known, roots)
+        others = np.einsum("liwk,iwjk->liwj", self.others, roots, optimize=True)
         free = np.trace(left, axis1=2, axis2=3).mean(axis=1) / doubts.shape[2]
-        return RobotRows(x, y, self.doubts, self.next, free)
+        return RobotRows(x, y, others, self.doubts, self.next, free)
 
     def moments(self, windows: slice = slice(None)) -> tuple[Float, Float]:
         """S [p, p] and, of each joint, its part of F [n, p]."""
@@ -278,6 +288,25 @@ class RobotRows:
     def residuals(self, p: Float) -> Float:
         """[n, windows, K]."""
         return np.asarray(self.known - np.einsum("iwpk,p->iwk", self.regressors, p))
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """A term that the equations do not have, to first order.
+
+    Attributes
+    ----------
+    law, joint : name in LAWS, and the joint from 0
+    size : of the term [N m or N over the unit of the law]
+    t : the size in its standard errors, from the scatter of the windows
+    shift : what p moves by with the term [p]
+    """
+
+    law: str
+    joint: int
+    size: float
+    t: float
+    shift: Float
 
 
 @dataclass(frozen=True)
@@ -295,6 +324,7 @@ class RobotFit:
     apart : their difference over its standard error [p]
     undetermined : a standard error is worth more than a tenth of the torques [p]
     windows : of the run
+    lacking : every law of each joint, the surest first
     """
 
     run: RobotRun
@@ -307,6 +337,7 @@ class RobotFit:
     apart: Float
     undetermined: npt.NDArray[np.bool_]
     windows: int
+    lacking: tuple[Lacking, ...]
 
     @property
     def design(self) -> RobotDesign:
@@ -424,8 +455,32 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
         variances.append(np.diag(inverse(own_s)) * np.diag(covariance) / np.diag(bread))
     apart = np.abs(halves[0] - halves[1]) / np.sqrt(np.sum(variances, axis=0))
     return RobotFit(
-        whole, columns, p, covariance, by_gain, uncorrected, np.array(halves), apart, undetermined, rows.windows
-    )
+        whole, columns, p, covariance, by_gain, uncorrected, np.array(halves), apart, undetermined, rows.windows,
+        tuple(sorted(_lacking(white, p, bread), key=lambda one: -abs(one.t))),
+    )  # fmt: skip
+
+
+def _lacking(white: RobotRows, p: Float, bread: Float) -> Iterator[Lacking]:
+    """Scores of the laws in the residuals of p.
+
+    Parameters
+    ----------
+    bread : (X^T X)^-1, the noise of the encoders taken off
+    """
+    e = white.residuals(p)
+    for law, columns in zip(LAWS, white.others, strict=True):
+        for joint, column in enumerate(columns):
+            mixed = bread @ np.einsum("wpk,wk->p", white.regressors[joint], column)
+            rest = -np.einsum("iwpk,p->iwk", white.regressors, mixed)
+            rest[joint] += column
+            own = float(np.sum(rest[joint] * column))
+            if own <= _DIRECTION * float(np.sum(column**2)):
+                continue  # the parameters have it
+            size = float(np.sum(column * e[joint])) / own
+            scores = np.sum(rest * (e - size * rest), axis=(0, 2))
+            beside = float(np.sum((scores[:-1] * scores[1:])[white.next]))
+            error = np.sqrt(max(np.sum(scores**2) + 2 * beside, np.sum(scores**2) / 2)) / own
+            yield Lacking(law, joint, size, size / max(float(error), 1e-300), -size * mixed)
 
 
 def _root(parts: Float, grams: Float) -> Float:
