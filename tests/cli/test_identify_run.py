@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from conftest import ROOT
 from in_process import pvid
 from rich.console import Console
 
@@ -210,7 +211,7 @@ def test_check_reports_rows_and_verdict(name: str) -> None:
 
 
 def test_check_names_what_cannot_be_identified(tmp_path: Path) -> None:
-    text = Path(pvid.__code__.co_filename).parents[2] / "host/src/pvid/models/dc_motor/mechanism.py"
+    text = ROOT / "host/src/pvid/models/dc_motor/mechanism.py"
     split = text.read_text(encoding="utf-8").replace(
         'model.unknown("b", "N*m*s", 1e-4)', 'model.unknown("b", "N*m*s", 1e-4) + model.unknown("b2", "N*m*s", 1e-4)'
     )
