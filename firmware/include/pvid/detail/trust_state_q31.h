@@ -7,6 +7,7 @@
 
 /* Only the functions of trust_q31.h write to it. */
 struct pvid_trust_q31 {
+    int64_t long_mean; /* of the variance ratios of the groups, PVID_VARIANCE_RATIO_BITS */
     pvid_trust_config_q31 config;
     uint16_t groups;        /* groups judged; saturates */
     uint16_t uninformative; /* consecutive uninformative groups */
@@ -21,7 +22,6 @@ struct pvid_trust_q31 {
     bool published;         /* an estimate has been published */
     bool misfit;
     int32_t anchor[PVID_MAX_P];       /* p at which the rows in the sums last agreed with p, or at the last renewal */
-    int64_t long_mean;                /* of the variance ratios of the groups, PVID_VARIANCE_RATIO_BITS */
     int32_t recent[PVID_TRUST_SHORT]; /* those of the last groups, rounded to 2^-10 */
     int32_t trusted[PVID_MAX_P];      /* p behind several valid publications in a row; the start before */
     int32_t own[PVID_MAX_P];          /* standard errors of the published estimate without the shared ones */

@@ -15,10 +15,10 @@ typedef struct {
     uint8_t needs; /* samples beside those of a tick */
     uint8_t signals;
     uint8_t decimation;                  /* D */
-    uint32_t wait;                       /* ticks until the block ends */
     uint16_t half;                       /* of the longest compensator */
     uint16_t missing;                    /* outputs until there is a step, this one included */
     uint16_t head;                       /* place of the next output */
+    uint32_t wait;                       /* ticks until the block ends */
     const int32_t *offset;               /* of the configuration */
     int32_t line[PVID_MAX_RING];         /* [signals][2] sums, [signals] of the block before, 2 [2 half + 1][signals] */
     int32_t before[3][PVID_MAX_SAMPLES]; /* counts of the last three ticks, latest first */
@@ -26,21 +26,21 @@ typedef struct {
 
 /* From the jets of a step to the channels of the second one before it. */
 typedef struct {
+    int64_t run[PVID_WEAK_RUNS];       /* twice the sum of the derivatives of the runs up to `now`, by trapezoids */
+    uint16_t index;                    /* of the step whose channels come next, in its half */
+    uint16_t lead;                     /* ticks from the first sample to the first step */
     uint8_t known;                     /* steps since the restart, 0..4 */
+    uint8_t half;                      /* that fills, 0 or 1 */
+    bool ran;                          /* there was a step: the runs have begun */
     int32_t now[PVID_MAX_INPUTS];      /* inputs of `values` at the step before the newest; runs and signs last */
     int32_t rate[PVID_WEAK_RUNS];      /* derivatives of the runs there */
     int32_t v[2][PVID_WEAK_SIGNS];     /* arguments of sgn there and at the step before */
-    int64_t run[PVID_WEAK_RUNS];       /* twice the sum of the derivatives of the runs up to there, by trapezoids */
     int32_t gain[PVID_WEAK_GAINS];     /* at the step before that */
     int32_t f[3][PVID_MAX_INTEGRANDS]; /* integrands there and at the two steps before it, latest first */
     int32_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
     int32_t twice[PVID_MAX_INTEGRANDS];
     int32_t owed[PVID_MAX_INTEGRANDS]; /* what the shifts of the integrands took away and the next step gets back */
     int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end */
-    uint16_t index;                          /* of the step whose channels come next, in its half */
-    uint8_t half;                            /* that fills, 0 or 1 */
-    uint16_t lead;                           /* ticks from the first sample to the first step */
-    bool ran;                                /* there was a step: the runs have begun */
 } pvid_weak_values_q31;
 
 /* A channel at a step. A core without a long multiplication takes it in halves, which it loads without a shift: the
@@ -98,11 +98,11 @@ typedef struct {
 /* From counts to the S_h of windows. */
 typedef struct {
     const pvid_weak_design_q31 *design;
-    uint8_t items_per_tick; /* harmonics that a tick adds or joins */
     pvid_weak_front_q31 front;
     pvid_weak_values_q31 values;
     pvid_weak_sums_q31 sums;
     pvid_weak_window_q31 window;
+    uint8_t items_per_tick; /* harmonics that a tick adds or joins */
 } pvid_weak_accumulator_q31;
 
 /* Sums of each sample over the steps of the half that fills [counts], if it has a least deviation. */
