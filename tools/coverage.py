@@ -35,7 +35,7 @@ BUILD = ROOT / "build" / "coverage"
 REPORT = BUILD / "html" / "index.html"
 REASONS = ROOT / "tests" / "coverage.toml"
 FIRMWARE = ROOT / "firmware"
-INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
+INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}", f"-I{ROOT / 'build'}"]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", *INCLUDES]
 # a function that is inlined even so would count once for each of its callers
@@ -92,6 +92,7 @@ def run(*command: str | Path, **environment: str) -> str:
 def build() -> list[Path]:
     """The core with counters, as the CMocka programs and the shared library have it; returns the programs."""
     shutil.rmtree(BUILD, ignore_errors=True)
+    run(ROOT / "tools" / "pvid", "model", "build", "kapitza", "-o", ROOT / "build" / "pendulum")  # of the tests in C
     core = [*sources.core_sources(), FIRMWARE / "link" / "link.c"]
     tests = playback_weak.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))

@@ -51,7 +51,7 @@ MEMORY = ROOT / "build" / "mutants.json"
 REPORT = ROOT / "build" / "mutants.md"
 REASONS = ROOT / "tests" / "mutants.toml"
 FIRMWARE = sources.FIRMWARE
-INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}"]
+INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}", f"-I{ROOT / 'build'}"]
 PRIVATE = sources.SRC.relative_to(FIRMWARE)
 LINK = FIRMWARE / "link" / "link.c"
 BESIDES = (*(ROOT / "host" / "native").glob("[lr]*.c"), LINK)  # of the shared library, beside the core
@@ -668,6 +668,8 @@ def main() -> int:
     parser.add_argument("--recorded", action="store_true", help="of all bits the recorded running hashes alone")
     parser.add_argument("--restart", action="store_true", help="ask those again, too, that were killed before")
     given = parser.parse_args()
+    if not ran([ROOT / "tools" / "pvid", "model", "build", "kapitza", "-o", ROOT / "build" / "pendulum"]):
+        raise SystemExit("pvid model build kapitza fails")
     if given.restart:
         MEMORY.unlink(missing_ok=True)
     results = campaign(given.count or COUNT, given.seed, memory=None if RECORDED else MEMORY)

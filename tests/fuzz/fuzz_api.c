@@ -10,8 +10,8 @@
 #include <stdlib.h>
 
 #include "hostile.h"
-#include "pendulum/configuration.h"
 #include "pendulum/kapitza_design_f32.h"
+#include "pendulum_q31.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
 #include "pvid/snapshot_refine.h"

@@ -1,5 +1,5 @@
-/* The pendulum's weak form in fixed point for the tests: functions and tables of pendulum/, readings of the standard
- * rig. In one source of each program. */
+/* The pendulum's weak form in fixed point for the tests: functions and tables of build/pendulum, readings of the
+ * standard rig. In one source of each program. */
 #ifndef KAPITZA_PLANT_Q31_H
 #define KAPITZA_PLANT_Q31_H
 

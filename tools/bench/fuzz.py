@@ -67,10 +67,10 @@ def fuzz_api(folder: Path, calls: int, seed: int = 1) -> ApiCalls:
     binary = folder / "fuzz_api"
     ignored = f"-fsanitize-ignorelist={ROOT / 'tests' / 'sanitizers.ignore'}"
     sanitizers = ["-fsanitize=address,undefined,float-cast-overflow,integer", ignored, "-Wno-pass-failed"]
-    build = [*_COMPILER, *sanitizers, *INCLUDES, f"-I{ROOT / 'tests' / 'unit'}"]
-    pendulum = ROOT / "tests" / "unit" / "pendulum"
-    made = [pendulum / f"{name}.c" for name in ("kapitza_weak_f32", "kapitza_weak_q31", "configuration_q31")]
-    sources = [FUZZ / "fuzz_api.c", *made, *core_sources()]
+    build = [*_COMPILER, *sanitizers, *INCLUDES, f"-I{folder}"]
+    pendulum = folder / "pendulum"
+    _run("the core", folder, [str(ROOT / "tools" / "pvid"), "model", "build", "kapitza", "-o", str(pendulum)])
+    sources = [FUZZ / "fuzz_api.c", FUZZ / "pendulum_q31.c", *pendulum.glob("kapitza_weak_*.c"), *core_sources()]
     _run("the core", folder, [*build, *map(str, sources), "-lm", "-o", str(binary)])
     done = _run("the core", folder, [str(binary), str(calls), str(seed)])
     figures = dict(re.findall(r"(\w+) (\d+)", done.stdout.splitlines()[0]))
