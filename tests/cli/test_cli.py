@@ -66,6 +66,7 @@ def test_the_paper_s_law_can_be_chosen(place: Path) -> None:
     assert (other["form"], other["identified"]) == ("strong", True) and other["hash"] != usual["hash"]
 
 
+@pytest.mark.night  # by day: its answers and hashes, test_demo_run.py
 def test_demo_prints_its_lines_and_draws_the_picture_of_the_readme(tmp_path: Path) -> None:
     done = pvid(tmp_path, "demo", PVID_CALLED="./tools/pvid")
     assert done.returncode == 0, done.stdout + done.stderr

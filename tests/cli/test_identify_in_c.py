@@ -212,7 +212,7 @@ def test_both_stages_in_c_identify_a_recording_and_the_answer_is_the_refined_one
 
 
 def test_the_refined_answer_in_c_is_printed_and_is_that_of_a_board(recorded: dict[str, Path], answers: Answers) -> None:
-    answer = pvid("identify", recorded["kapitza"], "--core", "f32", "--refine", "--on", HOST_TARGET)
+    answer = pvid("identify", recorded["kapitza"], "--core", "f32", "--refine")
     assert answer.return_value == DONE and "Kapitza" in answer.stdout and ": refined, C in float32" in answer.stdout
     assert "refined by the second stage, first after" in answer.stdout
     shown = answers("rigid_body", "--core", "f32", "--refine")
