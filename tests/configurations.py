@@ -145,7 +145,7 @@ RANGES = {"weak": WEAK, "weak q31": WEAK_Q31, "estimator": OWN}
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 WITHOUT = {"weights": Status.BAD_BANK, "model": Status.BAD_MODEL}
 SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}  # what a form's init fills in
-# Of the identifier: tests/core/test_weak_valid_q31.py, tests/unit/test_weak.c.
+# Of the identifier: tests/unit/test_weak_valid_q31.c, test_weak.c.
 ELSEWHERE = {"design", "refine", "range", "drive_min", "offset", "trust.shared"}
 UNUSED = {
     "weak": SET_BY_INIT | {"estimator.correlation", "estimator.row_weight", "compensation"} | ELSEWHERE,

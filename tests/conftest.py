@@ -36,17 +36,17 @@ SLOW = """
     board/ports board/profile core/standard_errors identification/refined_kernel base/subprocesses
     identification/additions deploy/deploy twin/weak_f32 codegen/build log/liar cli/demo_run identification/judge
     tools/pages core/trust_q31 cli/api identification/scale_errors board/targets identification/own_mechanisms
-    core/core_q31 identification/refined twin/second_stage show/view board/refined_board tools/wheel
+    identification/refined twin/second_stage show/view board/refined_board tools/wheel
     board/strong_image cli/several board/mechanism_board board/field core/read_while_stepping cli/foreign_files
     identification/several_recordings fleet/batch board/refined_stream codegen/generated_q31 bench/mechanisms
     cli/readme log/verify log/witness oracle/weak_in_c board/weak_boards core/weak_rows_q31 core/arithmetic_options
     codegen/weak_c core/recorded_hashes oracle/feedback codegen/generated_f32 oracle/weak_identify
     bench/accidents core/sizes_agree twin/state tools/notebooks oracle/corners model/elimination
-    twin/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
-    twin/runs_begin oracle/scale identification/refined_length twin/refinement codegen/refine
+    core/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
+    twin/runs_begin oracle/scale identification/refined_length core/refinement codegen/refine
     core/dropped_calls sim/rigs core/bad_config bench/longevity core/model_library core/equation_error tools/docs
     identification/wild_samples board/port cli/output tools/proofs log/untrusted
-    show/pictures tools/loops oracle/strong_described twin/estimator_q31 tools/analysis twin/kinds codegen/random
+    show/pictures tools/loops oracle/strong_described tools/analysis codegen/random
     bench/hard log/export log/text_table core/dead_zone tools/mutate bench/model_boards
     deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
     design/differentiation identification/following codegen/fitted_sizes identification/gallery
@@ -57,8 +57,6 @@ SLOW = """
 # and dry friction; an input that is a derivative; a hidden coordinate of order two. The others are tests of the night.
 BY_DAY = ("battery_2rc", "dc_motor", "kapitza", "two_mass_drive")
 _NONE = SimpleNamespace(params={})
-# Of these, the tests that belong to the inner loop all the same.
-QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -115,7 +113,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     places = {name: place for place, name in enumerate(SLOW)}
     files = {item: f"{item.path.parent.name}/{item.path.stem.removeprefix('test_')}" for item in items}
     for item in items:
-        if files[item] in places and item.name.partition("[")[0] not in QUICK:
+        if files[item] in places:
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: places.get(files[item], len(places)))
 

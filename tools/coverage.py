@@ -47,11 +47,10 @@ PLAY = "import configurations; from pvid.core.native import Native; configuratio
 PLAY_WEAK = "import playback_weak; [list(one.digests(one.library)) for one in playback_weak.subjects()]"
 # The weak form in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
-    *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_q31", "second_stage", "refinement")),
+    *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_q31", "second_stage")),
     *(f"tests/core/test_{name}_q31.py" for name in ("weak_snapshot", "weak_rows", "trust")),
-    *(f"tests/twin/test_{name}.py" for name in ("kinds", "kinds_q31", "estimator_q31")),
+    *(f"tests/core/test_{name}.py" for name in ("kinds", "kinds_q31", "refinement")),
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "renewal", "snapshot_weak")),
-    "tests/core/test_weak_valid_q31.py",
     "tests/codegen/test_fitted_sizes.py",  # builds for one design
 )
 # A compiler that counts branches, but not those of a sanitizer; each call has a folder of its own, since objects of

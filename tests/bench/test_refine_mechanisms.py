@@ -167,7 +167,8 @@ def test_an_input_that_is_held_keeps_the_droop_of_its_own_steps_alone() -> None:
 @pytest.mark.night
 def test_each_mechanism_is_in_a_table_with_a_cell_for_each_column() -> None:
     made = cases()
-    assert {name for name, *_ in made} == set(NAMES)
+    refused = {"buck_converter", "thrust_stand"}  # a reading contains parameters of the motion
+    assert {name for name, *_ in made} == set(NAMES) - refused
     name, rate, case = next(one for one in made if one[0] == "rigid_body")
     rows = list(rows_of(name, rate, case, [run_case(case, 0)]))
     assert [len(row) for row in rows] == [len(HEADER)] * 6 and rows[0][8] == "1 of 1"

@@ -14,7 +14,7 @@ from pvid.core.sources import SRC
 TIMEOUT_S = 60.0
 FAULT = 112
 # A port needs nothing of the core. The build of all of it, without an FPU, shows that firmware/cmake/no_float.cmake
-# finds no floating point in the fixed-point core (as tests/core/test_core_q31.py does for each compiler).
+# finds no floating point in the fixed-point core.
 WITH_THE_CORE = "microbit"
 
 boards = pytest.mark.parametrize("board", BOARDS.values(), ids=lambda board: board.name)
@@ -60,6 +60,15 @@ def ask(board: Board, letters: bytes) -> Outcome:
 def numbers(outcome: Outcome) -> dict[str, int]:
     found = re.findall(r"^([a-z_0-9]+) ([0-9]+)$", outcome.text, re.MULTILINE)
     return {name: int(value) for name, value in found}
+
+
+@pytest.mark.long
+def test_the_fixed_point_core_has_no_floating_point_on_risc_v_either() -> None:
+    """The build itself says so (firmware/cmake/no_float.cmake)."""
+    board = BOARDS["virt-rv32imac"]
+    image(board)
+    tables = {"PORT_CHECK_TABLES": str(BUILD / "runs" / "roots"), "PVID_LEAVE_OUT": ""}
+    build(board, BUILD / f"{board.name}-whole", tables, source=ROOT / "tests" / "ports")
 
 
 @boards

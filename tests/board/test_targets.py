@@ -1,4 +1,4 @@
-"""The core on every board: built by its cross compiler, run in its emulator, the bits of the host and the twin."""
+"""The core on every board: built by its cross compiler, run in its emulator, the bits of the host."""
 
 from dataclasses import replace
 from functools import cache
@@ -16,7 +16,6 @@ from pvid.board.boards import BOARDS, Board, run
 from pvid.board.replay_image import REPORT_EVERY, ReplayReport, parse_report, play
 from pvid.board.strong_image import hashes_of, standard_run
 from pvid.board.weak_image import weak_image
-from pvid.codegen.strong_twin import StrongModelTwin
 
 FORMS_AND_CORES = [*sizes.ALL, (sizes.REFINED, "f32")]
 TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
@@ -48,13 +47,13 @@ def refined_hashes(board: Board) -> npt.NDArray[np.uint32]:
 
 @cache
 def expected_hashes(form: str, core: str) -> npt.NDArray[np.uint32]:
-    """Running hash after every tick of the run that `pvid sizes` plays: of the weak form that of the twin, which other
-    tests compare with the C core here; of the others that of the C core, since their twins are slow."""
+    """Running hash of the C core here after every tick of the run that `pvid sizes` plays; tests/twin and tests/codegen
+    compare it with the twin's."""
     if form == "strong":
         return hashes_of(standard_run("kapitza"))
     if core == "q31":
-        return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run("kapitza", long=True))
-    return mechanism_image.twin_hashes(mechanism_image.mechanism_run("kapitza", long=True))
+        return mechanism_image_q31.native_hashes(mechanism_image_q31.fixed_run("kapitza", long=True))
+    return mechanism_image.native_hashes(mechanism_image.mechanism_run("kapitza", long=True))
 
 
 def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -> None:
@@ -63,20 +62,6 @@ def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -
         tick: int(expected[tick - 1]) for tick in range(REPORT_EVERY, report.ticks + 1, REPORT_EVERY)
     }
     assert report.hash == int(expected[-1])
-
-
-@pytest.mark.ticks(short=1500, long=5000)
-def test_the_host_computes_the_bits_of_the_strong_twin(ticks: int) -> None:
-    design = standard_run("kapitza")
-    samples = design.samples[:ticks]
-    assert np.array_equal(hashes_of(design)[:ticks], StrongModelTwin(design.strong, design.config).run(samples).hash)
-
-
-def test_the_host_computes_the_bits_of_the_weak_twin() -> None:
-    replay = mechanism_image.mechanism_run("kapitza", long=True)
-    fixed = mechanism_image_q31.fixed_run("kapitza", long=True)
-    assert np.array_equal(mechanism_image.native_hashes(replay), expected_hashes("weak", "f32"))
-    assert np.array_equal(mechanism_image_q31.native_hashes(fixed), expected_hashes("weak", "q31"))
 
 
 @pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)

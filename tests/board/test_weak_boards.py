@@ -1,4 +1,4 @@
-"""The weak form of a mechanism on emulated boards, in either arithmetic: the hash that the twin predicts."""
+"""The weak form of a mechanism on emulated boards, in either arithmetic: the hash of the core here."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31
 from pvid.board.boards import BOARDS
-from pvid.board.mechanism_image import MISSING, build_mechanism_image, header, mechanism_run, native_hashes, twin_hashes
+from pvid.board.mechanism_image import MISSING, build_mechanism_image, header, mechanism_run, native_hashes
 from pvid.board.replay_image import REPORT_EVERY, play
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.weak_library import weak_native, weak_native_q31
@@ -43,20 +43,20 @@ def _long(board: str, name: str, core: str) -> Any:
         *(_long("mps2-an386", name, "q31") for name in KINDS),
     ],
 )
-def test_a_board_computes_the_bits_of_the_twin(board: str, name: str, core: str) -> None:
+def test_a_board_computes_the_bits_of_the_core_here(board: str, name: str, core: str) -> None:
     if core == "f32":
         run = mechanism_run(name)
-        expected, native = twin_hashes(run), native_hashes(run)
+        expected = native_hashes(run)
         image, _ = build_mechanism_image(BOARDS[board], run)
     else:
         fixed = mechanism_image_q31.fixed_run(name)
-        expected, native = mechanism_image_q31.twin_hashes(fixed), mechanism_image_q31.native_hashes(fixed)
+        expected = mechanism_image_q31.native_hashes(fixed)
         image, _ = mechanism_image_q31.build_fixed_image(BOARDS[board], fixed)
     report = play(BOARDS[board], image, TIMEOUT_S)
     assert report.ticks == len(expected)
     assert {at: int(expected[at - 1]) for at in report.hashes} == report.hashes
     assert len(report.hashes) == len(expected) // REPORT_EVERY
-    assert report.hash == int(expected[-1]) == int(native[-1])
+    assert report.hash == int(expected[-1])
     assert report.instructions_mean > 0
 
 

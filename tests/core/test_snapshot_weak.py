@@ -1,7 +1,7 @@
 """Snapshots of the weak form: bits from any tick on, and what differs in any field is refused with its own status.
 
 The fields are those of the headers: a new one that neither the snapshot nor the fingerprint has fails here. The
-fixed-point core: tests/twin/test_weak_snapshot_q31.py.
+fixed-point core: tests/core/test_weak_snapshot_q31.py.
 """
 
 import re

@@ -85,10 +85,11 @@ def test_the_twin_has_the_bits_of_the_pendulum_with_options(options: tuple[str, 
 
 
 @pytest.mark.parametrize("name", [NAME, "dc_motor"])
-def test_the_twin_has_the_bits_of_both_stages_over_a_missing_sample(name: str) -> None:
+def test_the_twin_has_the_bits_of_both_stages_over_missing_and_wild_samples(name: str) -> None:
     given = refined(name)
     core, samples = given.identifier(), given.rig.samples[:5000].copy()
     samples[2500, 0] = np.nan
+    samples[[900, 1401], -1] += np.float32(20) * samples[:, -1].std()
     record = core.run_both(samples)
     assert_same(record, PrintedTwin(given.library.sources, core.config, given.settings), samples)
     assert Reason.UPDATED in record.told

@@ -1,6 +1,6 @@
-/* Saving and restoring an identifier: it continues bit for bit, refuses what is not its own, and power may fail at
- * any byte of a save. The fixed-point core is in test_weak_q31.c, whole runs are in
- * tests/core/test_snapshot_weak.py. */
+/* Restoring an identifier refuses what is not its own, and power may fail at any byte of a save. That a restored one
+ * continues bit for bit, and that each field and table entry counts, is shown of either core in
+ * tests/core/test_snapshot_weak.py and test_weak_snapshot_q31.py. */
 #include "test.h"
 
 #include "first_order.h"
@@ -14,7 +14,6 @@
 #define ROOM PVID_SNAPSHOT_WEAK_F32
 
 static pvid_weak_f32 identifier;
-static pvid_weak_f32 restored;
 static pvid_weak_f32 before;
 static pvid_weak_design_f32 design;
 static uint8_t image[ROOM];
@@ -38,52 +37,6 @@ static void run(pvid_weak_f32 *self, first_order *rig, int ticks)
 static size_t save(const pvid_weak_config_f32 *config, uint32_t generation, uint8_t to[])
 {
     return pvid_snapshot_save_weak_f32(&identifier, config, generation, to, ROOM);
-}
-
-/* ---- continuation ---- */
-
-/* Saves after every tick of half a window, so in every stage of a window's work, and lets both go on. */
-static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
-{
-    const pvid_weak_config_f32 config = weak_config();
-    assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
-    first_order rig = {.generator = 1u};
-    run(&identifier, &rig, 8 * HOP);
-    for (int tick = 0; tick < HOP; tick++) {
-        const size_t n = save(&config, 1, image);
-        assert_int_equal(n, PVID_SNAPSHOT_WEAK_F32);
-        assert_int_equal(pvid_weak_init_f32(&restored, &config), PVID_OK);
-        assert_int_equal(pvid_snapshot_restore_weak_f32(&restored, &config, image, n), PVID_SNAPSHOT_RESTORED);
-        assert_int_equal(pvid_snapshot_save_weak_f32(&restored, &config, 1, again, ROOM), n);
-        assert_memory_equal(image, again, n);
-        first_order other = rig;
-        run(&identifier, &rig, 1);
-        run(&restored, &other, 1);
-        const size_t later = save(&config, 1, image);
-        assert_int_equal(pvid_snapshot_save_weak_f32(&restored, &config, 1, again, ROOM), later);
-        assert_memory_equal(image, again, later);
-    }
-}
-
-/* p goes back to the published estimate, to which the solve in progress then points: into the object itself. */
-static void a_pointer_into_the_object_points_into_the_restored_one(void **state)
-{
-    pvid_weak_config_f32 config = weak_config();
-    config.trust.revert_after = 1;
-    assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
-    int seen = 0;
-    const float still[2] = {0.0f, 0.0f};
-    for (int i = 0; i < 8 * HOP; i++) { /* no motion at all: every window is held */
-        (void)pvid_weak_step_f32(&identifier, still);
-        if (identifier.finish.work.solve.fallback != NULL) {
-            seen++;
-            assert_int_equal(pvid_weak_init_f32(&restored, &config), PVID_OK);
-            const size_t n = save(&config, 1, image);
-            assert_int_equal(pvid_snapshot_restore_weak_f32(&restored, &config, image, n), PVID_SNAPSHOT_RESTORED);
-            assert_ptr_equal(restored.finish.work.solve.fallback, restored.trust.estimate.p);
-        }
-    }
-    assert_true(seen > 0);
 }
 
 /* ---- refusals ---- */
@@ -175,18 +128,6 @@ static void a_snapshot_of_the_other_core_is_of_another_kind(void **state)
     assert_int_equal(pvid_snapshot_restore_weak_q31(&fixed, &kapitza_config_q31, image, sizeof image),
                      PVID_SNAPSHOT_OTHER_KIND);
     assert_int_equal(restore(&config, image, sizeof image), PVID_SNAPSHOT_RESTORED);
-}
-
-static void a_table_that_changed_is_another_design(void **state)
-{
-    const pvid_weak_config_f32 config = weak_config();
-    start_and_save(&config);
-    const float kept = circle[1];
-    circle[1] = kept + 1.0f;
-    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_OTHER_DESIGN);
-    circle[1] = kept;
-    design.overlap += 1.0f;
-    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_OTHER_DESIGN);
 }
 
 /* ---- two slots ---- */
@@ -292,13 +233,10 @@ static void every_entry_of_a_list_counts_in_a_fingerprint(void **state)
 }
 
 static const struct CMUnitTest tests[] = {
-    cmocka_unit_test(a_restored_run_continues_bit_for_bit_from_every_tick),
-    cmocka_unit_test(a_pointer_into_the_object_points_into_the_restored_one),
     cmocka_unit_test(every_damaged_byte_is_seen_and_nothing_is_changed),
     cmocka_unit_test(every_length_that_is_too_short_is_refused),
     cmocka_unit_test(snapshot_of_another_object_names_its_kind),
     cmocka_unit_test(a_snapshot_of_the_other_core_is_of_another_kind),
-    cmocka_unit_test(a_table_that_changed_is_another_design),
     cmocka_unit_test(the_format_of_rows_counts),
     cmocka_unit_test(slots_are_used_in_turn),
     cmocka_unit_test(generations_go_round),

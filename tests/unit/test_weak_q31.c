@@ -319,24 +319,6 @@ static void a_weight_beyond_its_counter_is_its_end(void **state)
 static uint8_t image[PVID_SNAPSHOT_WEAK_Q31];
 static uint8_t again[PVID_SNAPSHOT_WEAK_Q31];
 
-static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
-{
-    static pvid_weak_q31 restored;
-    start();
-    plant_state plant = released_plant();
-    run(&plant, 5000, 0, NULL);
-    for (int i = 0; i < HOP; i++) {
-        assert_int_equal(pvid_snapshot_save_weak_q31(&identifier, &config, 1, image, sizeof image), sizeof image);
-        assert_int_equal(pvid_weak_init_q31(&restored, &config), PVID_OK);
-        assert_int_equal(pvid_snapshot_restore_weak_q31(&restored, &config, image, sizeof image),
-                         PVID_SNAPSHOT_RESTORED);
-        plant_state other = plant;
-        const pvid_reason reason = tick(&identifier, &plant, 0);
-        assert_int_equal(tick(&restored, &other, 0), reason);
-        assert_memory_equal(&restored, &identifier, sizeof restored);
-    }
-}
-
 static void a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read(void **state)
 {
     static pvid_weak_q31 before;
@@ -460,7 +442,6 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test_setup(the_noise_is_computed_where_it_is_used, start_again),
     cmocka_unit_test_setup(ticks_behind_the_join_are_those_without_harmonics, start_again),
     cmocka_unit_test_setup(a_weight_beyond_its_counter_is_its_end, start_again),
-    cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
     cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
     cmocka_unit_test(the_lead_is_what_the_front_end_needs),
     cmocka_unit_test(signals_of_several_ticks_are_those_of_their_definition),

@@ -2,7 +2,6 @@
 #include "test.h"
 
 #include "first_order.h"
-#include "persist/fingerprint_weak_f32.h"
 #include "weak/valid_f32.h"
 
 #define TERMS 5
@@ -189,80 +188,6 @@ static void tables_of_a_design(void **state)
     GIVES(own.variance[0] = INFINITY, PVID_BAD_DESIGN);
 }
 
-static uint32_t fingerprint(void)
-{
-    return pvid_fingerprint_weak_design_f32(&design) ^ pvid_fingerprint_weak_model_f32(&model);
-}
-
-#define COUNTS(change)                                                                                                 \
-    do {                                                                                                               \
-        start_again();                                                                                                 \
-        theta.n_kinds = 2;                                                                                             \
-        theta.kind_end = ends;                                                                                         \
-        const uint32_t as_it_is = fingerprint();                                                                       \
-        change;                                                                                                        \
-        assert_int_not_equal(fingerprint(), as_it_is);                                                                 \
-    } while (0)
-
-/* A restored state belongs to one model and one design: whatever is changed in a table, from its first entry to its
- * last, is another one. */
-static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
-{
-    static const uint8_t others[2] = {2, 4};
-    static const uint8_t ends[2] = {1, 4};
-    static const uint8_t last[2] = {1, 5};
-    static const uint8_t others_of_c[4] = {0, 1, 2, 2};
-    for (size_t i = 0; i < (5u * HOP) / 2u; i++) {
-        COUNTS(own.circle[i] += 1.0f);
-    }
-    for (size_t i = 0; i < 2u; i++) {
-        COUNTS(own.signal[i].sample++);
-        COUNTS(own.signal[i].source++);
-        COUNTS(own.jet[i].signal ^= 1u);
-        COUNTS(own.jet[i].order ^= 1u);
-        COUNTS(own.noise[i].kind ^= 1u);
-        COUNTS(own.noise[i].power ^= 1u);
-        COUNTS(own.noise[i].a ^= 1u);
-        COUNTS(own.noise[i].b ^= 1u);
-        COUNTS(own.noise[i].factor *= 2.0f);
-    }
-    for (size_t i = 0; i < CHANNELS; i++) {
-        COUNTS(own.channel[i].gain ^= 1u);
-        COUNTS(own.channel[i].integrand ^= 1u);
-        COUNTS(own.channel[i].fold ^= 1u);
-        COUNTS(own.channel[i].plain ^= 1u);
-        COUNTS(own.channel[i].ramp ^= 1u);
-    }
-    for (size_t i = 0; i < TERMS; i++) {
-        COUNTS(own.term[i].channel++);
-        COUNTS(own.term[i].order++);
-        COUNTS(own.term[i].column++);
-        COUNTS(own.term[i].factor *= 2.0f);
-    }
-    COUNTS(own.kind[0].thetas++);
-    COUNTS(own.kind[0].nuisances++);
-    COUNTS(own.kind[0].first++);
-    COUNTS(own.order[0]++);
-    COUNTS(own.variance[0] += 1.0f);
-    COUNTS(own.width[0] += 1.0f);
-    COUNTS(theta.kind_end = others);
-    COUNTS(theta.kind_end = last);
-    COUNTS(theta.c_row = others_of_c);
-    COUNTS(theta.c_column = others_of_c);
-    COUNTS(theta.positive++);
-    COUNTS(design.overlap += 1.0f);
-    COUNTS(design.functions++);
-    COUNTS(design.power++);
-    COUNTS(design.decimation++);
-    for (size_t i = 0; i < 3u; i++) {
-        start_again();
-        own.filter[1] = (pvid_weak_filter_f32){3, own.weights};
-        const uint32_t as_it_is = fingerprint();
-        own.weights[i] += 1.0f;
-        assert_int_not_equal(fingerprint(), as_it_is);
-    }
-}
-
 static const struct CMUnitTest tests[] = {
     cmocka_unit_test(what_either_core_refuses),
     cmocka_unit_test(counts_of_a_model),
@@ -272,6 +197,5 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test(terms_and_kinds),
     cmocka_unit_test(sizes_of_a_design),
     cmocka_unit_test(tables_of_a_design),
-    cmocka_unit_test(every_entry_of_a_table_counts_in_the_fingerprint),
 };
 RUN(tests)

@@ -3,7 +3,6 @@
 #include "test.h"
 
 #include "kapitza_plant_q31.h"
-#include "persist/fingerprint_weak_q31.h"
 #include "pvid/pvid_q31.h"
 #include "weak/valid_q31.h"
 
@@ -280,89 +279,6 @@ static void the_configuration(void **state)
     INIT_GIVES(config.estimator.start[0] = -1, PVID_BAD_START);
 }
 
-static int32_t turns[200]; /* and what is behind the table */
-
-static uint32_t fingerprint(void)
-{
-    design.circle = turns;
-    return pvid_fingerprint_weak_design_q31(&design) ^ pvid_fingerprint_weak_model_q31(&model);
-}
-
-#define COUNTS(change)                                                                                                 \
-    do {                                                                                                               \
-        start_again();                                                                                                 \
-        memcpy(turns, kapitza_circle_q31, sizeof kapitza_circle_q31);                                                  \
-        const uint32_t as_it_is = fingerprint();                                                                       \
-        change;                                                                                                        \
-        assert_int_not_equal(fingerprint(), as_it_is);                                                                 \
-    } while (0)
-
-/* A restored state belongs to one model and one design: whatever is changed in a table, from its first entry to its
- * last, is another one. */
-static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
-{
-    const size_t length = sizeof kapitza_circle_q31 / sizeof kapitza_circle_q31[0];
-    for (size_t i = 0; i < length; i++) {
-        COUNTS(turns[i]++);
-    }
-    start_again();
-    const uint32_t hash = fingerprint();
-    for (size_t i = length; i < sizeof turns / sizeof turns[0]; i++) {
-        turns[i]++;
-        assert_int_equal(fingerprint(), hash);
-    }
-    for (size_t i = 0; i < kapitza_weak_q31.samples; i++) {
-        COUNTS(own.full_scale[i]++);
-    }
-    for (size_t i = 0; i < kapitza_weak_q31.signals; i++) {
-        COUNTS(own.down[i]++);
-        COUNTS(own.signal[i].sample++);
-        COUNTS(own.signal[i].source++);
-    }
-    for (size_t i = 0; i < kapitza_weak_q31.jets; i++) {
-        COUNTS(own.jet[i].signal ^= 1u);
-        COUNTS(own.jet[i].order ^= 1u);
-        COUNTS(own.filter[i].down++);
-    }
-    for (size_t i = 0; i < kapitza_weak_q31.channels; i++) {
-        COUNTS(own.format[i].value ^= 1u);
-        COUNTS(own.format[i].lift ^= 1u);
-        COUNTS(own.format[i].own ^= 1u);
-        COUNTS(own.format[i].plain ^= 1u);
-        COUNTS(own.format[i].ramp ^= 1u);
-        COUNTS(own.channel[i].gain ^= 1u);
-        COUNTS(own.channel[i].integrand ^= 1u);
-        COUNTS(own.channel[i].fold ^= 1u);
-        COUNTS(own.channel[i].plain ^= 1u);
-        COUNTS(own.channel[i].ramp ^= 1u);
-    }
-    for (size_t i = 0; i < kapitza_weak_q31.integrands; i++) {
-        COUNTS(own.integral[i].down++);
-        COUNTS(own.integral[i].twice++);
-    }
-    for (size_t i = 0; i < kapitza_kind[0].end; i++) {
-        COUNTS(own.factor[i].m++);
-        COUNTS(own.factor[i].e++);
-        COUNTS(own.term[i].channel++);
-        COUNTS(own.term[i].order++);
-        COUNTS(own.term[i].column++);
-    }
-    for (size_t i = 0; i < kapitza_design_q31.n_noise; i++) {
-        COUNTS(own.noise[i].kind ^= 1u);
-        COUNTS(own.noise[i].power ^= 1u);
-        COUNTS(own.noise[i].a ^= 1u);
-        COUNTS(own.noise[i].b ^= 1u);
-        COUNTS(own.noise[i].factor.m++);
-    }
-    COUNTS(own.order[0]++);
-    COUNTS(own.variance[0].m++);
-    COUNTS(own.kind[0].nuisances++);
-    COUNTS(design.fine = !design.fine);
-    COUNTS(design.functions++);
-    COUNTS(design.decimation++);
-    COUNTS(design.sum_shift++);
-}
-
 static const struct CMUnitTest tests[] = {
     cmocka_unit_test(what_either_core_refuses),
     cmocka_unit_test(counts_of_a_model),
@@ -374,6 +290,5 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test(noise_of_the_sensors),
     cmocka_unit_test(shifts),
     cmocka_unit_test(the_configuration),
-    cmocka_unit_test(every_entry_of_a_table_counts_in_the_fingerprint),
 };
 RUN(tests)

@@ -245,7 +245,6 @@ def _laws_of(plant: Plant, axis: Axis) -> Iterator[Effect]:
 
 
 _LATE_NAMES = ("lag", "late", "delayed", "early", "advanced", "{x}.d(2)")
-_GAINS = ("larger than recorded", "smaller than recorded")
 
 # Name, right names ({u}: the input), strengths, true input from the recorded one over its largest magnitude.
 _INPUTS: tuple[tuple[str, tuple[str, ...], tuple[float, ...], Callable[[Float, float], Float]], ...] = (

@@ -13,9 +13,9 @@ from bench.kinds import KINDS
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
-from pvid.board.mechanism_image import twin_hashes as float_hashes
+from pvid.board.mechanism_image import native_hashes as float_hashes
 from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
-from pvid.board.mechanism_image_q31 import twin_hashes as fixed_hashes
+from pvid.board.mechanism_image_q31 import native_hashes as fixed_hashes
 from pvid.board.replay_image import ReplayReport, play
 from pvid.settings.enums import Core
 
@@ -31,7 +31,7 @@ _NO_FIGURE = {"the image does not fit": "no room", "float32 has no bits of the t
 
 
 def differs(report: ReplayReport, expected: npt.NDArray[np.uint32]) -> bool:
-    """Whether a hash of the board is not that of the twin at the same tick, or the run ended early."""
+    """Whether a hash of the board is not that of the core here at the same tick, or the run ended early."""
     return report.ticks != len(expected) or report.differs_at(expected) is not None
 
 
@@ -42,12 +42,12 @@ def rows(names: tuple[str, ...] = USUAL) -> tuple[tuple[Board, Core], ...]:
 
 @cache
 def expected(name: str, core: Core) -> npt.NDArray[np.uint32]:
-    """Hashes of the twin on a mechanism's shipped rig."""
+    """Hashes of the core here on a mechanism's shipped rig."""
     return float_hashes(mechanism_run(name)) if core == "f32" else fixed_hashes(fixed_run(name))
 
 
 def played(board: Board, name: str, core: Core) -> tuple[ReplayReport, npt.NDArray[np.uint32]]:
-    """A mechanism's shipped rig on a board, and the hashes of the twin.
+    """A mechanism's shipped rig on a board, and the hashes of the core here.
 
     Raises PvidError where it does not fit, or the board's float32 is another one.
     """
@@ -67,7 +67,7 @@ def reason_for_no_figure(error: PvidError) -> str:
 
 
 def row_of(board: Board, core: Core, names: tuple[str, ...] = KINDS) -> tuple[str, ...]:
-    """Mean instructions of a tick (an AVR: clock cycles) of each mechanism, and whether all bits are the twin's.
+    """Mean instructions of a tick (an AVR: clock cycles) of each mechanism, and whether all bits are the same.
 
     Raises PvidError where an image fails.
     """

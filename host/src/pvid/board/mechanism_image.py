@@ -17,7 +17,7 @@ from pvid.board.replay_image import REPORT_EVERY
 from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.weak_library import weak_native, weak_sources
+from pvid.codegen.weak_library import weak_native
 from pvid.configuration.weak import config_for_simulated_rig, samples_of
 from pvid.core.sizes import smallest
 from pvid.core.sources import left_out
@@ -28,7 +28,6 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.enums import Core
 from pvid.settings.weak import WeakConfig
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.printed import PrintedTwin
 
 Float32 = npt.NDArray[np.float32]
 
@@ -124,11 +123,6 @@ def mechanism_run(name: str, ticks: int | None = None, *, long: bool = False) ->
 def native_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
     return weak_native(run.compiled, run.config.design).identifier_of(run.config).run_samples(run.samples).hash
-
-
-def twin_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
-    """Running hash of the numpy twin after every tick, [ticks]."""
-    return PrintedTwin(weak_sources(run.compiled, run.config.design), run.config).run(run.samples).hash
 
 
 def header(run: MechanismRun) -> str:

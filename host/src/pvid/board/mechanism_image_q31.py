@@ -14,12 +14,11 @@ from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with, long_run, measured_from
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
 from pvid.codegen import files_weak_q31
-from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31
+from pvid.codegen.weak_library import weak_native_q31
 from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.weak import simulated_run_of
 from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
 from pvid.models import mechanisms
-from pvid.twin.printed import PrintedTwin
 
 MADE_BY = "pvid.board.mechanism_image_q31"
 
@@ -84,13 +83,6 @@ def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
     weak = run.weak
     identifier = weak_native_q31(weak.made, weak.parameters, weak.config).identifier()
     return identifier.run_samples(run.counts).hash
-
-
-def twin_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
-    """Running hash of the numpy twin after every tick, [ticks]."""
-    weak = run.weak
-    sources = weak_sources_q31(weak.made, weak.parameters, weak.config)
-    return PrintedTwin(sources, weak.config).run(run.counts).hash
 
 
 def header(run: FixedRun) -> str:

@@ -30,7 +30,6 @@ _SETTLED = 0.01  # standard errors: of the last step
 _NEARLY = 0.3  # of one from which rounding leads no farther
 _RUNS_AWAY = 1e100  # a reading, or its derivative: the square of a larger one overflows
 _NO_SQUARE = 1e150  # of residuals over the sensors' noise, and of their derivatives
-_START_SD = 1e3  # of the outputs' spread: the starts are free
 _MORE = 1.05  # times the samples: what shorter blocks must cover
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
 _PARTS = (1, 2, 4, 8, 16, 32, 64)  # of a block, whose scores scatter

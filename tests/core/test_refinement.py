@@ -1,10 +1,12 @@
-"""The refinement in C and its twin: the same bits at every tick, whatever the samples."""
+"""The refinement of the library's pendulum, stepped by itself, whatever the samples.
+
+Its bits are those of the twin with the first stage: tests/twin/test_second_stage.py.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,49 +16,16 @@ from pendulum_plant import STANDARD_PENDULUM, Sensors, simulate, standard_sensor
 
 from pvid.codegen.refine import refine_functions
 from pvid.configuration.refine import refine_settings
-from pvid.core.model_library import NATIVE, core_of
 from pvid.core.native import Native
 from pvid.core.refine_native import RefineNative, RefineRecord
-from pvid.core.sources import FOLDERS
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.settings.cores import FLOAT
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
-from pvid.twin import fnv
-from pvid.twin.printer.program import printed_module
-from pvid.twin.printer.values import filled, numbers
 
 Float = npt.NDArray[np.float64]
 TRUTH = STANDARD_PENDULUM.linear
 BLOCK_S = 3.0  # two periods of the slow mode
 BEFORE = 500  # ticks before the weak form's first estimate
-
-
-@cache
-def module() -> ModuleType:
-    """The refinement of the library's pendulum, printed."""
-    roots = [f"pvid_{one}_f32" for one in ("replay_refine", "refine_init", "refine_freeze", "refine_gap")]
-    return printed_module([*core_of(FLOAT, True)], [*FOLDERS, NATIVE], {}, roots)
-
-
-class Twin:
-    """It, stepped as RefineNative."""
-
-    def __init__(self, config: RefineConfig) -> None:
-        self.module, self.state, self.running = module(), module().pvid_refine_f32(), [fnv.START]
-        self.parameters = len(config.prior_sd)
-        settings = filled(self.module, "pvid_refine_config_f32", config)
-        assert self.module.pvid_refine_init_f32(self.state, settings, 2, None) == 0
-
-    def run(self, given: Float, p: Float, se: Float) -> RefineRecord:
-        ticks, flat = len(given), np.zeros((2, len(given) * self.parameters), np.float32)
-        reason, hashes = np.zeros(ticks, np.uint8), np.zeros(ticks, np.uint32)
-        arrays = (numbers(one, np.float32(0)) for one in (given, p, se))
-        with np.errstate(all="ignore"):
-            self.module.pvid_replay_refine_f32(
-                self.state, ticks, given.shape[1], *arrays, self.running, reason, hashes, *flat
-            )
-        return RefineRecord(reason, hashes, *flat.reshape(2, ticks, self.parameters))
 
 
 @cache
@@ -87,20 +56,12 @@ def weak(ticks: int, off: tuple[float, float, float]) -> tuple[Float, Float]:
     return p, np.full((ticks, 4), 0.5)
 
 
-def both(given: Float, config: RefineConfig, off: tuple[float, float, float]) -> RefineRecord:
-    """The record of the core, after the comparison with the twin's."""
-    p, se = weak(len(given), off)
-    core = RefineNative(Native(), config).run(given, p, se)
-    twin = Twin(config).run(given, p, se)
-    np.testing.assert_array_equal(core.reason, twin.reason)
-    np.testing.assert_array_equal(core.hash, twin.hash)
-    np.testing.assert_array_equal(core.r, twin.r)
-    np.testing.assert_array_equal(core.se, twin.se)
-    return core
+def played(given: Float, config: RefineConfig, off: tuple[float, float, float]) -> RefineRecord:
+    return RefineNative(Native(), config).run(given, *weak(len(given), off))
 
 
 def test_a_good_start_is_refined() -> None:
-    core = both(samples(9.0, 2.0), configuration(), (0.01, -0.01, 0.01))
+    core = played(samples(9.0, 2.0), configuration(), (0.01, -0.01, 0.01))
     assert Reason.UPDATED in core.reason
     # a quarter of the blocks of the whole run: some times the bound of .007 % for 40 s
     assert np.max(np.abs(core.r[-1, :3] / TRUTH - 1)) < 2e-3
@@ -114,7 +75,7 @@ def test_faults_of_all_kinds() -> None:
     given[3500:3520, 1] = np.nan
     given[6000:6003, 0] = np.nan
     given[7000:, 1] += 0.03
-    core = both(given, configuration(forgetting_s=10.0), (0.03, -0.03, 0.03))
+    core = played(given, configuration(forgetting_s=10.0), (0.03, -0.03, 0.03))
     assert Reason.REJECTED_NOT_FINITE in core.reason
 
 
@@ -130,7 +91,7 @@ def test_a_drive_beyond_its_range_begins_anew() -> None:
     """The pivot jumps by 0.3 m: its second derivative is far beyond the range while the filter sees the jump."""
     given = samples(12.0, 2.0).copy()
     given[4000:, 0] += 0.3
-    core = both(given, configuration(), (0.01, -0.01, 0.01))
+    core = played(given, configuration(), (0.01, -0.01, 0.01))
     assert Reason.REJECTED_NOT_FINITE in core.reason[4000:4300]
     assert Reason.UPDATED in core.reason[4300:]
     assert np.max(np.abs(core.r[-1, :3] / TRUTH - 1)) < 2e-3
@@ -140,7 +101,7 @@ def test_a_drive_beyond_its_range_begins_anew() -> None:
 def test_wild_samples(gate: float) -> None:
     """1.9 rad and 25 mm every half second: without the gate no block fits."""
     given = wild(samples(9.0, 2.0), (0.025, 1.9), 501)
-    core = both(given, configuration(outlier_gate=gate), (0.01, -0.01, 0.01))
+    core = played(given, configuration(outlier_gate=gate), (0.01, -0.01, 0.01))
     assert (Reason.UPDATED in core.reason) == (gate > 0)
     if gate > 0:
         assert np.max(np.abs(core.r[-1, :3] / TRUTH - 1)) < 2e-3
@@ -153,28 +114,13 @@ def test_jumps_and_kinks_are_no_wild_samples() -> None:
     given[:, 0] += 0.02 * np.abs(np.mod(t, 1.4) - 0.7)
     given[4000:, 1] += 0.3
     given[:1500] = given[1500]
-    found = [both(given, configuration(outlier_gate=gate), (0.0, 0.0, 0.0)).hash for gate in (0.0, 4.0)]
+    found = [played(given, configuration(outlier_gate=gate), (0.0, 0.0, 0.0)).hash for gate in (0.0, 4.0)]
     np.testing.assert_array_equal(found[0], found[1])
 
 
 def test_a_start_from_which_nothing_converges() -> None:
-    core = both(samples(6.0, 2.0), configuration(), (0.6, -0.3, -0.3))
+    core = played(samples(6.0, 2.0), configuration(), (0.6, -0.3, -0.3))
     assert Reason.HELD_SEARCHING in core.reason
-
-
-def test_gap_and_freeze() -> None:
-    given = samples(3.0, 1.0)
-    p, se = weak(len(given), (0.0, 0.0, 0.0))
-    core = RefineNative(Native(), configuration())
-    twin = Twin(configuration())
-    for first, frozen in ((0, False), (1000, True), (1700, False)):
-        last = {0: 1000, 1000: 1700, 1700: 3000}[first]
-        core.freeze(frozen)
-        twin.module.pvid_refine_freeze_f32(twin.state, frozen)
-        part = given[first:last], p[first:last], se[first:last]
-        np.testing.assert_array_equal(core.run(*part).hash, twin.run(*part).hash)
-        core.gap()
-        twin.module.pvid_refine_gap_f32(twin.state)
 
 
 @pytest.mark.parametrize("bits", [12, 16])
