@@ -305,8 +305,12 @@ class Model:
         ----------
         text : "drop*sgn(i)": a term of the only equation; "equation 1: drop*sgn(i)": of the equation with this name;
             "V: V + drop*sgn(V)": what the signal V is in place of what was recorded. The unknown is linear in it.
+            "equation 1: a*x; equation 2: -a*x": several with it.
         guess, sd : of the unknown [its unit, which follows from the equation where it can]
         """
+        *others, text = text.split(";")
+        for other in others:
+            self.add(other, guess, sd)
         where, _, expression = text.rpartition(":")
         parsed = typed_expression(expression, self._names())
         if parsed == 0:

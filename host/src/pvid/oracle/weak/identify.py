@@ -259,8 +259,10 @@ def _judged(
             if named is not None and any(one.name == "halves" for one in reasons):
                 named = replace(named, complete=named.complete and _halves_agree(compiled, named.fit))
             if named is not None:
-                for one in (named.fit, named.further) if named.complete else ():
-                    lacking = lacking.also(one.p - fit.p)
+                if named.complete:  # what is named explains a time constant within a sample, too
+                    reasons = [one for one in reasons if one.name != "rate"]
+                    for one in (named.fit, named.further):
+                        lacking = lacking.also(one.p - fit.p)
                 reasons += of_missing(fit, lacking, named, min(found.r2))
         if lacking is not None and (unknown := of_unexplained(compiled, found, lacking)):
             lacking = lacking.also(library.scores.by_parts())

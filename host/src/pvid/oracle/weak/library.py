@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+import sympy as sp
 
-from pvid.model.compiled import CompiledModel
+from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.evaluation import numpy_function
+from pvid.model.signals import Jet, order_of
 from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.filters import polynomial_weights
@@ -40,6 +42,7 @@ from pvid.oracle.weak.terms import (
     Course,
     Law,
     Recorded,
+    is_measured,
 )
 
 _RATE = (21, 2)  # samples and degree that give a sensor's rate in a law
@@ -53,6 +56,22 @@ _COURSES = ((GAIN, OF_GAIN), (OFFSET, OF_OFFSET), (CONSTANT, OF_LOAD))
 _MOST_GAIN = 0.6  # largest believable change of a gain
 
 _STEP = 1e-3  # of a signal's size: of the differences that give a column
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A motion.
+
+    Attributes
+    ----------
+    of : a sensor, or a deflection
+    names : of the sensors that it is made of
+    rows : in which a force of the deflection acts, with its sign; {}: in any
+    """
+
+    of: Recorded
+    names: Sequence[str]
+    rows: dict[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -124,27 +143,28 @@ class Library:
 
     def _laws(self) -> Iterator[Candidate]:
         grid, rows = self.fit.rows.record.grid, self.fit.rows
-        named: list[tuple[str, Law, float]] = [("", CONSTANT, 0.0)]
+        named: list[tuple[str, Law, float, dict[int, float]]] = [("", CONSTANT, 0.0, {})]
         values: list[Float] = [np.ones(grid.size)]
-        for one in self._recorded():
-            if one.signal.kind != "sensor" or one.signal.driven:
-                continue
-            x, v = self._motion(one)
-            turns = one.signal.unit == "rad" and float(np.ptp(x)) > np.pi / 2
+        for name, one in self._moving.items():
+            x, v = self._motion(one.of)
+            second = any(order_of(equation, one.names) > 1 for equation in self.model.equations)
+            turns = one.of.signal.unit == "rad" and float(np.ptp(x)) > np.pi / 2
             changes = float(np.min(x)) < 0 < float(np.max(x))
             for law in LAWS:
-                if (law.angle and not turns) or (law.signs and not changes):
+                if law.angle > turns or law.signs > changes or law.inertia > second:
                     continue
                 width = law.part * float(np.max(np.abs(x))) or law.width * float(np.sqrt(np.mean(v**2)))
                 width = float(f"{width:.2g}")
-                named.append((one.signal.name, law, width))
+                named.append((name, law, width, one.rows))
                 values.append(law.of(x, v, width))
-        sums = self._sums([law for _, law, _ in named], values)
+        sums = self._sums([law for _, law, _, _ in named], values)
         theta = self.fit.parameters.theta(self.fit.p)
-        for kind, row in enumerate(self.model.rows):
-            largest = _believable(rows.columns[kind], theta[kind], sums)
-            for (name, law, width), own, most in zip(named, sums, largest, strict=True):
-                yield Candidate(row.name, name, law, width, _in_row(own, kind, rows.kinds), most=float(most))
+        largest = [_believable(columns, th, sums) for columns, th in zip(rows.columns, theta, strict=True)]
+        for place, (name, law, width, acts) in enumerate(named):
+            for where in [acts] if acts else [{kind: 1.0} for kind in range(rows.kinds)]:
+                signs = tuple((self.model.rows[kind].name, sign) for kind, sign in where.items())
+                change, most = self._in_rows(signs, sums[place]), min(float(largest[kind][place]) for kind in where)
+                yield Candidate(signs[0][0], name, law, width, change, most=most, rows=signs)
 
     def _soft_frictions(self) -> Iterator[Candidate]:
         """Signs that do not switch at once."""
@@ -268,15 +288,38 @@ class Library:
             return replace(one, change=self._softened(one.level))
         x, v = (np.ones(self.fit.rows.record.grid.size),) * 2
         if one.signal:
-            x, v = self._motion(self.recorded(one.signal))
-        kind = next(kind for kind, row in enumerate(self.model.rows) if row.name == one.where)
-        sums = self._sums([one.kind], [one.kind.of(x, v, one.level)])[0]
-        return replace(one, change=_in_row(sums, kind, self.fit.rows.kinds))
+            x, v = self._motion(self._moving[one.signal].of)
+        return replace(one, change=self._in_rows(one.rows, self._sums([one.kind], [one.kind.of(x, v, one.level)])[0]))
+
+    def _in_rows(self, signs: Sequence[tuple[str, float]], sums: Float) -> Change:
+        own = dict(signs)
+        return _fixed([own.get(row.name, 0.0) * sums for row in self.model.rows])
 
     def recorded(self, name: str) -> Recorded:
         """A signal as recorded."""
-        values, design = np.asarray(self.run[name], np.float64), self.design
-        return Recorded(self.model.signal(name), values, design.sample_rate, design.window_s, largest(values))
+        return self._as_recorded(self.model.signal(name), np.asarray(self.run[name], np.float64))
+
+    def _as_recorded(self, signal: Signal, values: Float) -> Recorded:
+        return Recorded(signal, values, self.design.sample_rate, self.design.window_s, largest(values))
+
+    @cached_property
+    def _moving(self) -> dict[str, Moving]:
+        """Sensors of the motion, and deflections: what a spring or a damper has between two sensors."""
+        out = {one.signal.name: Moving(one, [one.signal.name]) for one in self._recorded() if is_measured(one)}
+        sensors = {one.jet for one in self.model.signals if one.kind == "sensor" and one.name in self.run}
+        parts = ((kind, part) for kind, row in enumerate(self.model.rows) for part in row.regressors)
+        for kind, psi in ((kind, sp.sympify(psi)) for kind, part in parts for n, psi in part.items() if n < 2):
+            slopes = {jet: psi.diff(jet) for jet in sorted(psi.free_symbols, key=str)}
+            if len(slopes) < 2 or not sensors.issuperset(slopes) or not all(k.is_number for k in slopes.values()):
+                continue
+            sign = sp.sign(next(iter(slopes.values())))
+            name, names = f"({sign * psi})", [jet.of for jet in slopes]
+            if name not in out:
+                parts_of = [float(sign * k) * np.asarray(self.run[jet.of]) for jet, k in slopes.items()]
+                signal = replace(self.model.signal(names[0]), jet=Jet(name))
+                out[name] = Moving(self._as_recorded(signal, np.asarray(sum(parts_of))), names)
+            out[name].rows[kind] = float(sign)
+        return out
 
     def _recorded(self) -> Iterator[Recorded]:
         for signal in self.model.signals:
@@ -286,10 +329,6 @@ class Library:
 
 def _fixed(change: list[Float]) -> Change:
     return lambda theta: change
-
-
-def _in_row(sums: Float, kind: int, kinds: int) -> Change:
-    return _fixed([sums if kind == other else np.zeros(sums.shape) for other in range(kinds)])
 
 
 def _believable(columns: Float, theta: Float, sums: Float) -> Float:

@@ -350,7 +350,7 @@ def _refitted(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fi
         with_it = _leveled(library, fit, one) if one.leveled else _sized(fit, one)
     except (np.linalg.LinAlgError, ArithmeticError, PvidError):
         return None
-    if with_it is None or not _is_nearer(with_it[1], fit) or _takes_place(with_it[1], fit):
+    if with_it is None or not _is_nearer(with_it[1], fit) or _takes_place(with_it[1], library.fit):
         return None
     return with_it
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -75,9 +76,10 @@ def terms_of(fit: Fit, found: Explained) -> tuple[Term, ...]:
             unit = _unit_of(model, term, term.kind)
             factor = scale[term.where] if term.kind.measure == "equation" else 1 / term.top
         elif term.kind is not SOFT:
-            law, factor, unit = _law(term), scale[term.where], None
+            law, unit = _law(term), None
             own = "{a}" if term.kind is CONSTANT else f"{{a}}*{law}"
-            typed = own if factor is None else f"{term.where}: {own}"
+            parts = _parts(term, scale)
+            factor, typed = (1 / parts[0][1], _typed(parts, own)) if parts else (None, own)
         out.append(
             Term(
                 where=term.where,
@@ -169,12 +171,15 @@ def in_words(model: CompiledModel, one: Candidate, scale: Mapping[str, float | N
     if isinstance(kind, Course):
         return _of_course(model, one, kind, scale)
     if isinstance(kind, Law):
-        law, factor = _law(one), scale[one.where]
-        verb = "seem" if one.where.startswith("equations") else "seems"
-        if factor is None:
-            return f"{one.where} {verb} to lack a term in {law}"
-        size = f"{one.size / factor:.3g}"
-        return f"{one.where} {verb} to lack {f'a constant of {size}' if kind is CONSTANT else f'{size}*{law}'}"
+        law, parts = _law(one), _parts(one, scale)
+        lacks = f"{one.where} {'seem' if one.where.startswith('equations') else 'seems'} to lack"
+        if not parts:
+            return f"{lacks} a term in {law}"
+        sizes = [(name, f"{factor * one.size:.3g}") for name, factor in parts]
+        if kind is CONSTANT:
+            return f"{lacks} a constant of {sizes[0][1]}"
+        others = [f" and {name} {size}*{law}" for name, size in sizes[1:]]
+        return f"{lacks} {sizes[0][1]}*{law}{''.join(others)}"
     signal = model.signal(one.signal)
     amount = abs(one.number)
     size = {
@@ -201,8 +206,25 @@ def _unit_of(model: CompiledModel, one: Candidate, kind: Course) -> str:
     return model.signal(one.signal).unit if kind.measure == "signal" else ""
 
 
+def _parts(one: Candidate, scale: Mapping[str, float | None]) -> list[tuple[str, float]]:
+    """Rows of a law, with what its size is to be multiplied by in their equations as written; [] where one is none."""
+    factors = [(name, sign, scale[name]) for name, sign in one.rows]
+    return [] if any(of is None for _, _, of in factors) else [(name, sign / of) for name, sign, of in factors if of]
+
+
+def _typed(parts: Sequence[tuple[str, float]], term: str) -> str:
+    ratios = [f"{factor / parts[0][1]:.6g}*" for _, factor in parts]
+    signs = [{"1*": "", "-1*": "-"}.get(one, one) for one in ratios]
+    return "; ".join(f"{name}: {sign}{term}" for (name, _), sign in zip(parts, signs, strict=True))
+
+
 def _law(one: Candidate) -> str:
-    return one.kind.text.format(x=one.signal, w=f"{one.level:.2g}")
+    law = one.kind.text
+    if one.signal.startswith("("):  # a deflection: its derivative is that of its sensors
+        law = law.replace("({x})", "{x}").replace("({x}.d())", "{x}.d()")
+        for order in (".d()", ".d(2)"):
+            law = law.replace("{x}" + order, re.sub(r"[A-Za-z_]\w*", rf"\g<0>{order}", one.signal))
+    return law.format(x=one.signal, w=f"{one.level:.2g}")
 
 
 def scale_of(model: CompiledModel, kind: int, p: Float) -> float | None:

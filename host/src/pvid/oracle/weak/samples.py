@@ -149,8 +149,8 @@ def too_slow(
     except PvidError:  # no simulation, no modes
         return []
     guess = np.array([one.guess for one in model.unknowns])
-    fastest = modes.fastest(p)
-    if not _FASTEST * rate < fastest < np.inf or modes.fastest(guess) < _FAST_GUESS * rate:
+    fastest, of_guess = modes.fastest(p), modes.fastest(guess)
+    if not _FASTEST * rate < fastest < np.inf or of_guess < _FAST_GUESS * rate:
         return []
     lost = [
         one.name
@@ -159,11 +159,12 @@ def too_slow(
     ]
     if not lost:
         return []
+    fastest = max(min(fastest, of_guess), _FASTEST * rate)  # what passes within a sample has no time constant here
     wanted = float(f"{_RULE * fastest:.1g}")
     many, verb = ("their", "are") if len(lost) > 1 else ("its", "is")
     text = (
         f"{listed(lost)} {verb} hardly identifiable at {rate:.4g} Hz: {many} time constant is "
-        f"{with_unit(1 / fastest, 's', 2)}, and a sample takes {with_unit(1 / rate, 's', 2)}."
+        f"{with_unit(1 / fastest, 's', 2)} or less, and a sample takes {with_unit(1 / rate, 's', 2)}."
     )
     text += f" Sample at {wanted:.6g} Hz." if is_explained else ""
     return [Reason("rate", text)]

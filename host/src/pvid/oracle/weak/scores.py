@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.errors import PvidError
 from pvid.oracle.weak import work
 from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.errors import clustered_variance
@@ -45,6 +46,8 @@ def between(before: Record, after: Record, windows: npt.NDArray[np.int64], step:
         own: dict[int, Float] = {}
         for term in row.terms:
             was, now = before.rows(functions, term), after.rows(other, term)
+            if len(was) != len(now):
+                raise PvidError("the other run has a gap")
             if term.column <= row.thetas and was is not now:
                 more = term.factor / step * (now[windows] - was[windows])
                 own[term.column] = own[term.column] + more if term.column in own else more

@@ -37,6 +37,7 @@ class Law:
     part : w over the largest magnitude of the signal; 0: the law has none
     angle : of angles that turn alone
     signs : of signals that change their sign alone
+    inertia : of signals that have a second derivative in the equations alone; else the rate is that of a time constant
     """
 
     text: str
@@ -46,6 +47,7 @@ class Law:
     part: float = 0.0
     angle: bool = False
     signs: bool = False
+    inertia: bool = False
 
 
 def _sign(x: Float) -> Float:
@@ -76,13 +78,13 @@ LAWS = (
     Law("abs({x})", lambda x, v, w: np.abs(x), signs=True),
     Law("{x}**2*{x}.d()", lambda x, v, w: x**3 / 3, order=1),
     Law("{x}.d()", lambda x, v, w: x, order=1),
-    Law("abs({x}.d())*{x}.d()", lambda x, v, w: np.abs(v) * v),
-    Law("{x}.d()**3", lambda x, v, w: v**3),
-    Law("sgn({x}.d())", lambda x, v, w: _sign(v)),
-    Law("abs({x}.d())", lambda x, v, w: np.abs(v)),
-    *(Law(_STRIBECK, _stribeck, width=width) for width in (0.03, 0.1, 0.3)),
+    Law("abs({x}.d())*{x}.d()", lambda x, v, w: np.abs(v) * v, inertia=True),
+    Law("{x}.d()**3", lambda x, v, w: v**3, inertia=True),
+    Law("sgn({x}.d())", lambda x, v, w: _sign(v), inertia=True),
+    Law("abs({x}.d())", lambda x, v, w: np.abs(v), inertia=True),
+    *(Law(_STRIBECK, _stribeck, width=width, inertia=True) for width in (0.03, 0.1, 0.3)),
     *(Law(_STOP, lambda x, v, w: x - np.clip(x, -w, w), part=part) for part in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)),
-    Law("{x}.d(2)", lambda x, v, w: x, order=2),
+    Law("{x}.d(2)", lambda x, v, w: x, order=2, inertia=True),
     Law("sin({x})", lambda x, v, w: np.sin(x), angle=True),
     COSINE,
     Law("sin(2*{x})", lambda x, v, w: np.sin(2 * x), angle=True),
@@ -171,8 +173,19 @@ def _shifted(of: Recorded, delay: float) -> Float:
 
 def _early(of: Recorded, _: float) -> Float:
     """What is added to a signal that is recorded late by a second, to first order: 1 s of its rate."""
-    z, out = of.values, np.zeros(len(of.values))
-    out[1:-1] = (z[2:] - z[:-2]) / 2 * of.rate
+    return _rate(of, 3)
+
+
+def _early_of_slow(of: Recorded, _: float) -> Float:
+    """The same of a motion that is slow beside its noise."""
+    return _rate(of, _SMOOTHED[0])
+
+
+def _rate(of: Recorded, samples: int) -> Float:
+    """From so many samples each; 0 within half of them of the ends."""
+    half, out = samples // 2, np.zeros(len(of.values))
+    if len(out) >= samples:
+        out[half:-half] = filtered(of.values, polynomial_weights(samples, 2, 1))[half:-half] * of.rate
     return out
 
 
@@ -191,10 +204,10 @@ def _play(of: Recorded, _: float) -> Float:
 def _without_cubic(of: Recorded, level: float) -> Float:
     """True values, of which those recorded are x (1 - level (x/top)^2)."""
     relative = of.values / of.top
-    x = relative.copy()
+    x, edge = relative.copy(), 1 / np.sqrt(max(3 * level, 1e-300))  # beyond it no sensor shows more
     for _ in range(_NEWTON):
         cubic = level * x * x
-        x = x - (x - cubic * x - relative) / np.maximum(1 - 3 * cubic, _STEEPEST)
+        x = np.clip(x - (x - cubic * x - relative) / np.maximum(1 - 3 * cubic, _STEEPEST), -edge, edge)
     return np.asarray(of.top * x)
 
 
@@ -212,7 +225,7 @@ def _quarter(of: Recorded) -> float:
     return 0.25 * of.window_s
 
 
-def _is_measured(of: Recorded) -> bool:
+def is_measured(of: Recorded) -> bool:
     """A sensor of what the mechanism does."""
     return of.signal.kind == "sensor" and not of.signal.driven
 
@@ -225,8 +238,13 @@ def _is_input(of: Recorded) -> bool:
     return of.signal.kind == "input"
 
 
+def _acts(of: Recorded) -> bool:
+    """Whether it drives the mechanism: an input, or what is measured of one."""
+    return of.signal.driven
+
+
 def _is_stepped(of: Recorded) -> bool:
-    return _is_measured(of) and of.signal.resolution > 0
+    return is_measured(of) and of.signal.resolution > 0
 
 
 def _is_turning(of: Recorded) -> bool:
@@ -258,7 +276,7 @@ GAIN = Act(
     "percent",
     ("larger", "smaller"),
     most=lambda _: 0.2,
-    applies=_is_input,
+    applies=_acts,
     typed="{u}*(1 + {a})",
 )
 
@@ -268,7 +286,7 @@ OFFSET = Act(
     "signal",
     ("", "-"),
     most=lambda of: of.top,
-    applies=_is_measured,
+    applies=is_measured,
 )
 
 _DELAY = Act(
@@ -296,7 +314,7 @@ _SHOWS = Act(
     ("-", "+"),
     levels=lambda _: (),
     most=lambda _: 0.9,
-    applies=_is_measured,
+    applies=is_measured,
     typed="{u} + {a}*{u}**3",
 )
 UNUSUAL, UNUSUAL_LAWS = ("advanced", "early"), (COSINE,)
@@ -308,7 +326,7 @@ ACTS = (
         lambda of, level: np.clip(of.values, -level, level),
         "signal",
         levels=_parts(0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93),
-        applies=_is_input,
+        applies=_acts,
     ),
     Act(
         "saturates at {word}{size} on that side alone",
@@ -316,18 +334,19 @@ ACTS = (
         "signal",
         ("", "-"),
         levels=_both(_parts(0.45, 0.6, 0.75, 0.9)),
-        applies=_is_input,
+        applies=_acts,
     ),
     Act(
         "has a dead band of {size}",
         _dead,
         "signal",
         levels=_parts(0.006, 0.012, 0.025, 0.05, 0.1, 0.2),
-        applies=_is_input,
+        applies=_acts,
     ),
-    Act("acts behind a lag of {size}", _lagged, "time", levels=_samples(0.5, 1, 2, 4, 8, 16), applies=_is_input),
+    Act("acts behind a lag of {size}", _lagged, "time", levels=_samples(0.5, 1, 2, 4, 8, 16), applies=_acts),
     _LATE,
     DELAY,
+    replace(DELAY, of=_early_of_slow),
     replace(_LATE, of=_early, levels=None, most=_quarter, exact=_LATE),
     Act(
         "acts as {u}*(1 {word} {size}*abs({u})/{top})",
@@ -335,7 +354,7 @@ ACTS = (
         "part",
         ("+", "-"),
         most=lambda _: 0.6,
-        applies=_is_input,
+        applies=_acts,
         typed="{u} + {a}*abs({u})*{u}",
     ),
     Act(
@@ -344,7 +363,7 @@ ACTS = (
         "part",
         ("+", "-"),
         most=lambda _: 0.6,
-        applies=_is_input,
+        applies=_acts,
         typed="{u} + {a}*{u}**3",
     ),
     Act(
@@ -353,7 +372,7 @@ ACTS = (
         "signal",
         ("more", "less"),
         most=lambda of: 0.4 * of.top,
-        applies=_is_input,
+        applies=_acts,
         typed="{u} + {a}*sgn({u})",
     ),
     Act(
@@ -362,7 +381,7 @@ ACTS = (
         "percent",
         ("larger", "smaller"),
         most=lambda _: 0.6,
-        applies=_is_input,
+        applies=_acts,
         typed="{u} + {a}*({u} - abs({u}))/2",
     ),
     GAIN,
@@ -432,6 +451,7 @@ class Candidate:
     top : of an act, largest magnitude of the signal as recorded; of a course, the change for size 1
     most : largest believable size
     weights : of a course, how far it is there in each window [windows]; None: all the time
+    rows : of a law, names of the rows that it stands in, and its sign there
     size : estimate
     certainty : |size| over its standard error
     own : part of the column's square that no change of p explains
@@ -448,6 +468,7 @@ class Candidate:
     top: float = 0.0
     most: float = np.inf
     weights: Float | None = None
+    rows: tuple[tuple[str, float], ...] = ()
     size: float = 0.0
     certainty: float = 0.0
     own: float = 0.0

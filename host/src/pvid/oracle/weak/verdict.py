@@ -63,6 +63,7 @@ ParameterStatus = Literal["identified", "near_zero", "not_identified"]
 
 # Of another parameter: part of its range.
 _UNKNOWN_OF_RANGE = 0.5
+_COLLAPSED = 1e-6  # of its guess: a value that no mechanism has, whatever its error
 _NEXT_TO_0 = 1e-3  # of its guess: a value and an error of it that mean 0
 
 # Two estimates disagree if they differ by so many standard errors of the difference ...
@@ -205,7 +206,7 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
             out.append(
                 Judged("not_identified", f"{one.name} is at its bound, {side} = {with_unit(bound, one.unit, 4)}")
             )
-        elif not se[k] <= limit:
+        elif not se[k] <= limit or one.positive and p < _COLLAPSED * one.guess and not own_scale:
             ran_down = one.positive and max(p, float(se[k])) < _NEXT_TO_0 * one.guess
             why = (
                 "the search takes {} to 0"

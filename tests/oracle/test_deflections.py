@@ -1,0 +1,114 @@
+"""What is missing between two masses, behind a measured drive, and in slow sensors. The plants are integrated here."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.model import Model, sgn
+from pvid.oracle.weak.identify import Identified, identify
+from pvid.oracle.weak.naming import terms_of
+from pvid.oracle.weak.terms import ACTS, Recorded
+
+Float = npt.NDArray[np.float64]
+RATE, SAMPLES, SUBSTEPS = 500.0, 5000, 3
+M, K, C, KT, MU = 300.0, 1.7e4, 1300.0, 2e5, 45.0
+
+
+def quarter_car() -> Model:
+    model = Model("quarter car")
+    z = model.sensor("z", "m", resolution=1e-5, reach=0.2, driven=True)
+    s, u = (model.sensor(name, "m", resolution=1e-5, reach=0.3) for name in "su")
+    m, k, c = model.known("m", "kg", M), model.unknown("k", "N/m", 2e4), model.unknown("c", "N*s/m", 1500.0)
+    mu, kt = model.unknown("mu", "kg", 40.0), model.unknown("kt", "N/m", 1.8e5)
+    model.equation(m * s.d(2) + c * (s.d() - u.d()) + k * (s - u))
+    model.equation(mu * u.d(2) - c * (s.d() - u.d()) - k * (s - u) + kt * (u - z))
+    return model
+
+
+def leg() -> Model:
+    model = Model("leg of a platform")
+    i = model.sensor("i", "A", resolution=5e-3, reach=10, driven=True)
+    x = model.sensor("x", "m", resolution=2e-6, reach=0.4)
+    m, b, fc = model.unknown("m", "kg", 20.0), model.unknown("b", "N*s/m", 80.0), model.unknown("Fc", "N", 15.0)
+    w = model.unknown("w", "N", 50.0, positive=False, sd=100.0)
+    kf = model.known("kf", "N/A", 60.0)
+    model.equation(m * x.d(2) + b * x.d() + fc * sgn(x.d()) + w - kf * i)
+    return model
+
+
+def drive(parts: tuple[tuple[float, float], ...]) -> Float:
+    t = np.arange(SAMPLES) / RATE
+    return np.asarray(sum(a * np.sin(2 * np.pi * f * t + k) for k, (a, f) in enumerate(parts)))
+
+
+def integrated(slope: Callable[[Float, float], Float], start: Float, u: Float) -> Float:
+    """States at the samples [n, states], by Runge and Kutta; u is a straight line between samples."""
+    h, x, out = 1 / RATE / SUBSTEPS, start, []
+    fine = np.interp(np.arange(2 * SUBSTEPS * len(u) + 1) / (2 * SUBSTEPS), np.arange(len(u)), u)
+    for k in range(len(u)):
+        out.append(x)
+        for a, b, c in (fine[2 * (SUBSTEPS * k + j) :][:3] for j in range(SUBSTEPS)):
+            one = slope(x, a)
+            two = slope(x + h / 2 * one, b)
+            three = slope(x + h / 2 * two, b)
+            x = x + h / 6 * (one + 2 * two + 2 * three + slope(x + h * three, c))
+    return np.array(out)
+
+
+def measured(x: Float, resolution: float, seed: int) -> Float:
+    noise = np.random.default_rng(seed).normal(0, resolution / 2, len(x))
+    return np.asarray(np.round((x + noise) / resolution) * resolution)
+
+
+@cache
+def car(cubic: float) -> dict[str, Float]:
+    z = drive(((0.008, 1.1), (0.006, 2.9), (0.004, 7.3)))
+
+    def slope(x: Float, road: float) -> Float:
+        s, v, u, w = x
+        force = C * (v - w) + K * (s - u) + cubic * (s - u) ** 3
+        return np.array([v, -force / M, w, (force - KT * (u - road)) / MU])
+
+    x = integrated(slope, np.zeros(4), z)
+    return {name: measured(own, 1e-5, k) for k, (name, own) in enumerate((("z", z), ("s", x[:, 0]), ("u", x[:, 2])))}
+
+
+def found(model: Model, run: dict[str, Float]) -> Identified:
+    return identify(model.compiled("own"), run, RATE)
+
+
+def test_law_of_a_spring_is_named_in_both_equations_with_a_line_that_adds_it() -> None:
+    one = found(quarter_car(), car(4e6))
+    assert one.named is not None and one.named.complete and one.verdict.status == "warning"
+    term = terms_of(one.fit, one.named)[0]
+    assert term.text.startswith("equation 1 seems to lack") and "*(s - u)**3 and equation 2 -" in term.text
+    assert term.size is not None and abs(term.size / 4e6 - 1) < 0.05 and term.typed is not None
+    model = quarter_car()
+    model.add(term.typed.format(a="k3"), sd=1e7)
+    again = found(model, car(4e6))
+    assert again.verdict.status == "good" and abs(again.values["k3"][0] / 4e6 - 1) < 0.02
+    assert abs(again.values["k"][0] / K - 1) < 0.005
+    assert found(quarter_car(), car(0.0)).named is None
+
+
+def test_measured_drive_that_acts_less_at_its_peaks_is_named() -> None:
+    i = drive(((1.0, 1.7), (0.8, 4.1), (0.5, 9.0)))
+
+    def slope(x: Float, amps: float) -> Float:
+        force = 60 * amps * (1 - 0.1 * abs(amps)) - 110 * x[1] - 18 * np.tanh(x[1] / 1e-3)
+        return np.array([x[1], force / 25])
+
+    run = {"i": measured(i, 5e-3, 1), "x": measured(integrated(slope, np.zeros(2), i)[:, 0], 2e-6, 2)}
+    one = found(leg(), run)
+    assert one.named is not None and one.named.complete
+    assert terms_of(one.fit, one.named)[0].text.startswith("i acts as i*(1 - 0.")
+
+
+def test_curved_sensor_beyond_what_it_can_show_stays_finite() -> None:
+    curved = next(act.exact for act in ACTS if act.exact is not None and act.text.startswith("shows"))
+    assert curved is not None
+    signal = leg().compiled("own").signal("x")
+    of = Recorded(signal, np.linspace(-1, 1, 101), RATE, 1.0, 1.0)
+    assert all(np.isfinite(curved.of(of, level)).all() for level in (-0.9, -0.1, 0.14, 0.2, 0.9))
