@@ -32,7 +32,7 @@ from pvid.model import Model
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.identify import Identified, identify
 from pvid.oracle.weak.library import Library
-from pvid.oracle.weak.missing import _student
+from pvid.oracle.weak.missing import student
 from pvid.oracle.weak.naming import told_once
 from pvid.oracle.weak.terms import ACTS, Course, Recorded
 from pvid.oracle.weak.verdict import Verdict
@@ -385,7 +385,7 @@ def test_what_no_term_explains_has_no_name() -> None:
 
 @pytest.mark.parametrize("freedom", [1.5, 9, 36.5, 20_000])
 def test_what_hardly_happens_by_chance_is_students_quantile(freedom: float) -> None:
-    assert _student(freedom) == pytest.approx(-stdtrit(freedom, 1e-8), rel=1e-6)
+    assert student(freedom) == pytest.approx(-stdtrit(freedom, 1e-8), rel=1e-6)
 
 
 def test_a_term_that_is_found_twice_is_told_once() -> None:

@@ -16,6 +16,7 @@ from pvid.identification.answer import Answer, Factors, Float, Value
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.chain import INERTIAL
 from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.missing import student
 from pvid.oracle.weak.robot import Lacking, RobotFit, RobotRun, identify_robot
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
@@ -23,15 +24,16 @@ from pvid.rig.run import Recording
 _CLASH = 4.5  # standard errors between the halves: one of 60 parameters is as far apart once in 2000 runs
 _STILL = 0.14  # of the samples: 13 bits, 500 Hz, 0.8 rad/s; of 10 runs each 89 % of the values are within two standard
 # errors there and 83 % with 12 bits
-_SOFT = 5.0  # of Student's t: friction as modelled has up to 3.8 in 60 joints
-_SURE = 5.0  # of Student's t of a term that is missing: without one the largest of 9 has been 3.4 in 8 recordings
-_MOVES = 2.0  # standard errors of noise: what a term must move a parameter by for a warning
+_CHANCE = 0.002  # of a clean recording: that one of all terms is taken for missing, by Student's t
+_TOO = 2.0  # of Student's t: from which the friction of another joint is doubted, too
+_APART = 2 / 3  # degrees of freedom of a window that overlaps half of the next
 _WORDS = {
     "q": "{size} * q{joint}: a spring, a cable, or a wrong gear",
     "1": "{size} at all times: an offset of its sensor, or a load",
     "abs(v)*v": "{size} * abs(v)*v of its rate v: drag",
+    "slow": "{size} at low speed: friction that is not dry plus viscous; move faster",
 }
-_UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2"}
+_UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2", "slow": ""}
 _SEEN = 1e-6  # relative size of a direction that the torques depend on
 _CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
 _PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -97,15 +99,10 @@ class RobotAnswer(Answer):
                 "record with more bits"
             )
             reasons.append(Reason("sensor", text))
-        if soft := [f"q{k + 1}" for k, one in enumerate(fit.of_slow) if abs(one) > _SOFT]:
-            text = (
-                f"the friction of {listed(soft)} at low speed is not dry plus viscous: standard errors may be too "
-                "small; move faster"
-            )
-            reasons.append(Reason("friction", text))
-        if (one := surest(fit)) is not None:
-            sd = np.sqrt(np.diag(fit.covariance))
-            moved = [k for k in np.argsort(-np.abs(one.shift) / sd) if abs(one.shift[k]) > _MOVES * sd[k]]
+        for one in sure(fit):
+            values = [self.values[name] for name in names]
+            sd = np.array([math.hypot(it.se_noise or math.inf, it.se_scale or 0.0) for it in values])
+            moved = [k for k in np.argsort(-np.abs(one.shift) / sd) if abs(one.shift[k]) > sd[k]]
             slides = self.model.chain is not None and self.model.chain.joints[one.joint].prismatic
             unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")
             size = _WORDS[one.law].format(size=with_unit(one.size, unit, 3), joint=one.joint + 1)
@@ -113,7 +110,14 @@ class RobotAnswer(Answer):
             if moved:
                 k = moved[0]
                 text += f"; with that {names[k]} would be {fit.p[k] + one.shift[k]:.4g} in place of {fit.p[k]:.4g}"
-            reasons.append(Reason("missing", text, alarm=bool(moved), of=tuple(names[k] for k in moved)))
+            reasons.append(
+                Reason(
+                    "friction" if one.law == "slow" else "missing",
+                    text,
+                    alarm=bool(moved),
+                    of=tuple(names[k] for k in moved),
+                )
+            )
         weak = [one.name for one in self.prediction if one.r2 < _EXPLAINED]
         if weak:
             text = (
@@ -153,9 +157,13 @@ class RobotAnswer(Answer):
         }
 
 
-def surest(fit: RobotFit) -> Lacking | None:
-    """The term that is missing, if one is."""
-    return fit.lacking[0] if fit.lacking and abs(fit.lacking[0].t) > _SURE else None
+def sure(fit: RobotFit) -> list[Lacking]:
+    """The term that is missing, if one is; of the friction of several joints each."""
+    limit = student(_APART * fit.windows, _CHANCE / 2 / max(len(fit.lacking), 1))
+    if not fit.lacking or abs(fit.lacking[0].t) <= limit:
+        return []
+    first, *others = fit.lacking
+    return [first, *(one for one in others if one.law == first.law == "slow" and abs(one.t) > _TOO)]
 
 
 def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
@@ -164,8 +172,7 @@ def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
     scale: Float = _gains(model)[:, np.newaxis] * fit.by_gain
     sizes, directions = np.linalg.eigh(fit.covariance)
     noise = directions * np.sqrt(np.maximum(sizes, 0.0))
-    lacking = surest(fit)
-    change = np.zeros((0, len(fit.p))) if lacking is None else lacking.shift[np.newaxis]
+    change = np.array([one.shift for one in sure(fit)]).reshape(-1, len(fit.p))
     values = {}
     for k, unknown in enumerate(model.unknowns):
         if fit.undetermined[k]:

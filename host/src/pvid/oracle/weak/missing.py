@@ -69,11 +69,11 @@ def _by_chance(windows: float, surest: float) -> float:
     """Standard errors, from the scatter of so many windows, that nothing reaches by chance: Student's, or the normal
     distribution's where the surest term does not even reach those."""
     normal = -NormalDist().inv_cdf(_CHANCE)
-    return normal if surest <= normal else _student(windows)
+    return normal if surest <= normal else student(windows)
 
 
-def _student(freedom: float) -> float:
-    """What Student's t exceeds with the probability _CHANCE; scipy's takes a sixth of a second to import.
+def student(freedom: float, chance: float = _CHANCE) -> float:
+    """What Student's t exceeds with a probability; scipy's takes a sixth of a second to import.
 
     With t = sqrt(f) cot(a) the probability is the integral of sin^(f - 1) from 0 to a, over that up to pi.
     """
@@ -83,7 +83,7 @@ def _student(freedom: float) -> float:
     for _ in range(60):
         angle = (low + high) / 2
         powers = np.exp((freedom - 1) * np.log(np.sin(angle * (nodes + 1) / 2)) - whole)
-        low, high = (low, angle) if angle / 2 * float(weights @ powers) > _CHANCE else (angle, high)
+        low, high = (low, angle) if angle / 2 * float(weights @ powers) > chance else (angle, high)
     return math.sqrt(freedom) / math.tan(high)
 
 

@@ -48,10 +48,18 @@ _REACHED = 1e-6  # of the energy of a direction: what slow steps have of it
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
 _MOST_BYTES = 4e9  # of the rows, with what is computed from them
 _DIRECTION = 1e-6  # relative size of a direction that is one
-LAWS: Mapping[str, Callable[[Float, Float], Float]] = {  # of a joint's position and rate
+
+
+def _slow(_: Float, v: Float) -> Float:
+    size = np.sqrt(np.mean(v**2, axis=1, keepdims=True))
+    return np.asarray(np.sign(v) * ((np.abs(v) > _SLOW * size) & (np.abs(v) < _FAST * size)))
+
+
+LAWS: Mapping[str, Callable[[Float, Float], Float]] = {  # of positions and rates of all joints [n, steps]
     "q": lambda q, v: q,
     "1": lambda q, v: np.ones(q.shape),
     "abs(v)*v": lambda q, v: np.abs(v) * v,
+    "slow": _slow,
 }
 
 
@@ -229,8 +237,8 @@ class RobotRows:
         """Of a run; see RobotRun.values."""
         functions = run.design.functions
         hop, n = functions.hop, len(run.chain.joints)
-        # At the peak 4 copies of the regressors and 7 of the doubts: measured on 3, 6 and 7 joints, to 13 %.
-        window = 8 * n * functions.count * (4 * len(columns) + 7 * functions.count)
+        # At the peak 4 copies of the regressors, 7 of the doubts, 2 of the laws: on 3, 6 and 7 joints, to 13 %.
+        window = 8 * n * functions.count * (4 * len(columns) + 7 * functions.count + 2 * len(LAWS))
         samples, most = sum(one.shape[1] for one in run.positions), int(_MOST_BYTES / window) * hop
         if samples > most:
             raise PvidError(
@@ -298,7 +306,7 @@ class Lacking:
     ----------
     law, joint : name in LAWS, and the joint from 0
     size : of the term [N m or N over the unit of the law]
-    t : the size in its standard errors, from the scatter of the windows
+    t : the size in its standard errors, from the scatter of the windows, which is at least that of the rows
     shift : what p moves by with the term [p]
     """
 
@@ -366,25 +374,6 @@ class RobotFit:
             inner = slice(taps // 2, whole.shape[-1] - taps // 2)
             slopes = np.apply_along_axis(filtered, -1, whole[1], weights)
             yield segment.torque[:, inner], (whole[0] + slopes)[..., inner]
-
-    @cached_property
-    def of_slow(self) -> Float:
-        """Student's t of each joint [n], over windows: residuals that have the sign of its rate while it is slow.
-
-        Fc and Fv take what friction does in the mean of all speeds; what is no dry and viscous friction remains.
-        """
-        taps, window = 2 * self.design.taps + 1, 2 * self.design.functions.hop
-        long = [one for one in self.run.values(self.columns, _STEPS) if one.position.shape[1] >= taps]
-        rates = [one.rate[:, taps // 2 : one.rate.shape[1] - taps // 2] for one in long]
-        sizes = np.sqrt(np.mean(np.concatenate(rates, axis=1) ** 2, axis=1))[:, np.newaxis]
-        sums = []
-        for rate, (measured, predicted) in zip(rates, self.predicted(self.run, self.p[np.newaxis]), strict=True):
-            slow = (np.abs(rate) > _SLOW * sizes) & (np.abs(rate) < _FAST * sizes)
-            own = (measured - predicted[:, 0]) * np.sign(rate) * slow
-            whole = own[:, : own.shape[1] // window * window]
-            sums.append(whole.reshape(len(own), -1, window).sum(axis=2))
-        found = np.concatenate(sums, axis=1)
-        return np.asarray(found.mean(axis=1) / (found.std(axis=1, ddof=1) / np.sqrt(found.shape[1]) + 1e-300))
 
 
 @np.errstate(invalid="ignore")  # what the noise of the encoders covers has no standard error
@@ -479,7 +468,7 @@ def _lacking(white: RobotRows, p: Float, bread: Float) -> Iterator[Lacking]:
             size = float(np.sum(column * e[joint])) / own
             scores = np.sum(rest * (e - size * rest), axis=(0, 2))
             beside = float(np.sum((scores[:-1] * scores[1:])[white.next]))
-            error = np.sqrt(max(np.sum(scores**2) + 2 * beside, np.sum(scores**2) / 2)) / own
+            error = np.sqrt(max(np.sum(scores**2) + 2 * max(beside, 0.0), own)) / own
             yield Lacking(law, joint, size, size / max(float(error), 1e-300), -size * mixed)
 
 
