@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from bench.peers.arm import JOINTS, standard_of, write_arm
-from bench.peers.compare import HEADER, TOOLS, fitted, interpreter, row, statements, tool_of
+from bench.peers.compare import HEADER, TOOLS, fitted, interpreter, report, row, statements, tool_of
 from bench.peers.rigs import CLEAN, LACKING, OFF, RIGS
+from pvid.base.errors import PvidError
 
 OWN = [name for name in TOOLS if not tool_of(name).PACKAGE]
 
@@ -91,6 +92,18 @@ def test_a_tool_that_fails_is_a_row_with_the_reason(tmp_path: Path) -> None:
     (told,) = fitted("textbook", "free_pendulum", tmp_path, 60)[0]
     assert told["values"] == {} and told["said"].startswith("KeyError")
     assert fitted("textbook", "no_such", tmp_path, 60)[1] != ""
+
+
+@pytest.mark.parametrize(
+    ("tool", "mechanism", "sentence"),
+    [
+        (["pvid"], [], "no such tool: pvid; there are pvid_itself, pvid_refined, "),
+        ([], ["arm3", "arm"], "no such mechanism: arm; there are dc_motor, .*, arm3$"),
+    ],
+)
+def test_an_unknown_name_is_one_sentence(tool: list[str], mechanism: list[str], sentence: str) -> None:
+    with pytest.raises(PvidError, match=sentence):
+        report(1, 1, tool, mechanism, lambda: None)
 
 
 def test_peers_do_not_need_the_product() -> None:

@@ -49,16 +49,20 @@ def option(name: str | list[str], default: Any, about: str = "", least: int = 1,
     return click.Option(names, default=default, show_default=True, help=about, **{**kind, **more})
 
 
-def chosen(mechanism: Collection[str], usual: Sequence[str] = ()) -> tuple[str, ...]:
-    """The mechanisms of a case; (): those that are usual for it, or all.
+def chosen(
+    given: Collection[str], usual: Sequence[str] = (), what: str = "mechanism", among: Sequence[str] = ()
+) -> tuple[str, ...]:
+    """Those of a case, among all mechanisms unless told; (): those that are usual for it, or all.
 
     Raises PvidError when there is none of a name.
     """
-    from pvid.models.mechanisms import names
+    if not among:
+        from pvid.models.mechanisms import names
 
-    if unknown := set(mechanism) - set(names()):
-        raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
-    return tuple((usual or names()) if mechanism == () else mechanism)
+        among = names()
+    if unknown := set(given) - set(among):
+        raise PvidError(f"no such {what}: {', '.join(sorted(unknown))}; there are {', '.join(among)}")
+    return tuple((usual or among) if given == () else given)
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,7 @@ class Case:
     rows : in place of a report: tables, their headers' names and those of the functions of their rows, which take
         mechanisms, a number and `advance`
     usual : mechanisms of `rows`, where none is named
+    keys : cells that name a row: a command that measures some rows leaves the others of the table
     """
 
     name: str
@@ -82,6 +87,7 @@ class Case:
     options: Sequence[click.Parameter] = ()
     rows: tuple[tuple[str, str, str], ...] = ()
     usual: tuple[str, ...] = ()
+    keys: int = 0
 
     @property
     def written(self) -> tuple[str, ...]:

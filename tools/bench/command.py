@@ -154,6 +154,7 @@ CASES = (
             click.Option(["--tool"], multiple=True, help="A file of tools/bench/peers. Default: all."),
             click.Option(["--mechanism"], multiple=True, help="Default: all."),
         ),
+        keys=3,
     ),
     Case(
         "fuzz-link",
@@ -273,7 +274,7 @@ def _add(one: Case) -> None:
             click.echo(line)
         for name, header, rows in tables:
             if rows:
-                put_results(data, name, header, rows)
+                put_results(data, name, header, rows, one.keys)
         for fault in report.faults:
             write_stderr(f"pvid: {fault}")
         wrong = report.faults or any(DIFFERS in row for _, _, rows in tables for row in rows)

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.case import Advance, Report, columns
+from bench.case import Advance, Report, chosen, columns
 from bench.peers.arm import Arm, write_arm
 from bench.peers.rigs import CLEAN, LACKING, OFF, RIGS, Rig
 from pvid.core.sources import ROOT
@@ -155,6 +155,7 @@ def rows(
 
 def report(seeds: int, seconds: int, tool: Sequence[str], mechanism: Sequence[str], advance: Advance) -> Report:
     """As the command prints it."""
-    found = [*rows(mechanism or (*RIGS, "arm3"), seeds, seconds, tool or tuple(TOOLS), advance)]
+    tools, names = chosen(tool, what="tool", among=[*TOOLS]), chosen(mechanism, among=[*RIGS, "arm3"])
+    found = [*rows(names, seeds, seconds, tools, advance)]
     said = f"Starts: {OFF[0]:.0%} off in even runs, {OFF[1]:.0%} in odd ones."
     return Report([("peers", HEADER, found)], said=[said])
