@@ -13,6 +13,7 @@ from struct_fields import set_field
 
 from pvid.base.errors import PvidError
 from pvid.codegen.files_strong_q31 import files_of
+from pvid.codegen.strong_library import strong_native
 from pvid.codegen.strong_library_q31 import StrongNativeQ31
 from pvid.codegen.strong_twin_q31 import StrongTwinQ31
 from pvid.configuration.strong import strong_design
@@ -344,3 +345,38 @@ def test_the_alarm_has_a_reference_where_a_block_has_few_rows() -> None:
     assert identifier.state.misfit.block < 64
     identifier.run_samples(design.counts[:400])
     assert identifier.state.misfit.least_part.e < 60  # 2^120 where there is none
+
+
+def test_both_cores_publish_what_no_row_shows() -> None:
+    """The distance from a reference, of all parameters together, beside the errors of the rows."""
+    model, run = simulation_of("rigid_body").model, recording("rigid_body")
+    p = strong_design(model, run).fitted.p
+    for reference in (p, p / 1.1, np.where(np.arange(len(p)) == 1, np.nan, p / 1.1)):
+        design = strong_design(model, run, reference=reference)
+        known = np.where(np.isnan(reference), 0.0, p - reference)
+        assert np.allclose(design.fitted.bias, known)
+        fixed = fixed_design(model, run, design)
+        own = StrongNativeQ31(fixed.strong_q31).started()
+        own.run_samples(fixed.counts, sums=False)
+        in_q31 = fixed.strong_q31.values(own.assess()["se"][: len(p)])
+        whole = strong_native(design.strong, design.config)
+        found = []
+        for config in (design.config, replace(design.config, shared=None)):
+            core = whole.identifier_of(config)
+            core.run_samples(design.samples, sums=False)
+            found.append(core.assess())
+        with_it, alone = (np.asarray(one["se"][: len(p)], np.float64) for one in found)
+        assert np.allclose(with_it, np.hypot(alone, design.fitted.shared), rtol=1e-3)
+        assert np.allclose((in_q31 / with_it)[known != 0], 1, rtol=1e-3)  # the reference is 10 % off: rows hardly count
+        covariance = found[0]["covariance"][: len(p), : len(p)]
+        assert np.allclose(np.sqrt(np.diag(covariance)), with_it, rtol=1e-5)
+        assert (covariance[0, 2] > 0.9 * with_it[0] * with_it[2]) == bool(known[0] != 0)
+
+
+def test_shared_errors_that_are_none_are_refused() -> None:
+    design, _ = made("rigid_body")
+    config = design.base.config
+    assert config.shared is not None
+    for wrong in (-config.shared, np.full_like(config.shared, np.nan)):
+        with pytest.raises(PvidError, match="shared"):
+            strong_native(design.strong, config).identifier_of(replace(config, shared=wrong))

@@ -14,11 +14,13 @@ from bench.weak import rms
 from pvid.base.errors import PvidError
 from pvid.codegen.strong_library import strong_native
 from pvid.codegen.weak_library import weak_native
-from pvid.configuration.strong import strong_design
+from pvid.configuration.strong import reference_of, strong_design
 from pvid.configuration.weak import samples_of, weak_config
+from pvid.identification.analysis import analysed
 from pvid.model.compiled import Signal
 from pvid.model.signals import order_of
 from pvid.oracle.weak.edges import with_edges
+from pvid.oracle.weak.identify import Identified
 from pvid.rig.run import Recording
 from pvid.sim.simulated_run import SOFT, RigSimulation, simulation_of
 
@@ -75,10 +77,22 @@ def as_sampled(simulation: RigSimulation) -> RigSimulation:
     return replace(simulation, model=with_edges(simulation.model, run, simulation.rig.sample_rate))
 
 
-def strong_of(simulation: RigSimulation) -> Form:
-    """With the window that the first run calls for."""
+def _recorded(simulation: RigSimulation) -> Recording:
+    """The first run, which both designs are for."""
     run = simulation.run(0, SOFT)
-    design = strong_design(simulation.model, Recording(run["t"], run, simulation.rig.sample_rate))
+    return Recording(
+        run["t"], {one.name: run[one.name] for one in simulation.model.signals}, simulation.rig.sample_rate
+    )
+
+
+def _analysed(simulation: RigSimulation) -> Identified:
+    return analysed(_recorded(simulation), simulation.model).found
+
+
+def strong_of(simulation: RigSimulation, found: Identified | None = None) -> Form:
+    """With the window that the first run calls for, and the errors that its distance from the weak form shows."""
+    reference = reference_of(found or _analysed(simulation))
+    design = strong_design(simulation.model, _recorded(simulation), reference=reference)
     native = strong_native(design.strong, design.config)
 
     def of(run: Run, start: Float) -> tuple[Float, Float]:
@@ -86,15 +100,16 @@ def strong_of(simulation: RigSimulation) -> Form:
         core = native.identifier_of(replace(design.config, estimator=own))
         samples = np.stack([np.asarray(run[one.name], np.float32) for one in design.strong.signals], axis=1)
         p = core.run_samples(samples, sums=False).p[-1].astype(np.float64)
-        return p, np.hypot(core.assess()["se"][: len(p)], design.fitted.change)
+        return p, core.assess()["se"][: len(p)].astype(np.float64)
 
     return Form(of, design.config.window / simulation.rig.sample_rate)
 
 
-def weak_of(simulation: RigSimulation) -> Form:
-    """With the rig's own design."""
+def weak_of(simulation: RigSimulation, found: Identified | None = None) -> Form:
+    """With the rig's own design, and the errors that the analysis of the first run shows."""
     truth, design = np.asarray(simulation.truth), design_of(simulation, SOFT)
-    config = weak_config(simulation.model, simulation.run(0, SOFT), design, truth)
+    run = simulation.run(0, SOFT)
+    config = weak_config(simulation.model, run, design, truth, shared=True, found=found or _analysed(simulation))
     native = weak_native(simulation.model, config.design)
 
     def of(run: Run, start: Float) -> tuple[Float, Float]:
@@ -118,7 +133,8 @@ def rows(names: Sequence[str], seeds: int, advance: Advance) -> Iterator[tuple[s
         for times in FINER:
             simulation = as_sampled(with_finer_sensors(simulation_of(name), times))
             try:
-                strong, weak = strong_of(simulation), weak_of(simulation)
+                found = _analysed(simulation)
+                strong, weak = strong_of(simulation, found), weak_of(simulation, found)
             except PvidError as error:
                 yield _refused(name, len(HEADER), error)
                 break

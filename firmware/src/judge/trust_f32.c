@@ -69,12 +69,12 @@ PVID_COLD static pvid_status config_is_valid(const pvid_trust_config_f32 *config
     return pvid_settings_within_f32(values, ranges, sizeof values / sizeof values[0]);
 }
 
-/* Shared errors of n_p parameters. */
-PVID_COLD static bool shared_are_valid(const float shared[], size_t n_p)
+PVID_COLD bool pvid_trust_shared_are_valid_f32(const float shared[], size_t n_p)
 {
-    bool valid = true;
+    bool valid = (shared == NULL) || (PVID_SHARED != 0);
+    const size_t count = (shared != NULL) ? n_p : 0u;
     size_t k = 0;
-    for (size_t a = 0; a < n_p; a++) {
+    for (size_t a = 0; a < count; a++) {
         for (size_t b = a; b < n_p; b++) {
             valid = valid && pvid_within_f32(shared[k], (a == b) ? 0.0f : -1.0f, (a == b) ? 1.0e9f : 1.0f);
             k++;
@@ -111,7 +111,7 @@ PVID_COLD pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust
     if (status != PVID_OK) {
         return status;
     }
-    if ((config->shared != NULL) && ((PVID_SHARED == 0) || !shared_are_valid(config->shared, estimator->model->n_p))) {
+    if (!pvid_trust_shared_are_valid_f32(config->shared, estimator->model->n_p)) {
         return PVID_BAD_SHARED;
     }
     memset(self, 0, sizeof *self);
@@ -290,14 +290,16 @@ PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason 
     return PVID_UPDATED;
 }
 
-/* Adds the shared errors, and to the covariance what they have in common. */
-PVID_COLD static void add_shared(const float shared[], const pvid_model_f32 *model, pvid_estimate_f32 *candidate)
+PVID_COLD void pvid_trust_add_shared_f32(const float shared[], size_t n_p, uint32_t positive,
+                                         pvid_estimate_f32 *candidate)
 {
-    const size_t n_p = model->n_p;
+    if ((PVID_SHARED == 0) || (shared == NULL)) {
+        return;
+    }
     float error[PVID_MAX_P];
     size_t k = 0;
     for (size_t a = 0; a < n_p; a++) {
-        error[a] = shared[k] * (pvid_is_positive_f32(model, a) ? candidate->p[a] : 1.0f);
+        error[a] = shared[k] * ((((positive >> a) & 1u) != 0u) ? candidate->p[a] : 1.0f);
         const float variance = (candidate->se[a] * candidate->se[a]) + (error[a] * error[a]);
         if (variance <= VARIANCE_MAX) {
             candidate->se[a] = sqrtf(variance);
@@ -415,9 +417,7 @@ PVID_COLD pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimato
         candidate->standing = self->standing.now;
         candidate->standing.age = 0;
         memcpy(self->own, candidate->se, sizeof self->own);
-        if ((PVID_SHARED != 0) && (self->config.shared != NULL)) {
-            add_shared(self->config.shared, estimator->model, candidate);
-        }
+        pvid_trust_add_shared_f32(self->config.shared, estimator->model->n_p, estimator->model->positive, candidate);
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         memcpy(candidate->se, self->own, sizeof self->own); /* as the second stage compares them */
         self->published = true;

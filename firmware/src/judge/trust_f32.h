@@ -23,6 +23,13 @@ pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *est
 void pvid_trust_stand_f32(pvid_trust_f32 *self, pvid_reason verdict, pvid_reason reason, float variance_ratio,
                           uint16_t freedom, bool errs, const pvid_estimate_f32 *candidate);
 
+/* Whether these are shared errors of n_p parameters, as of trust.h; NULL: none. */
+bool pvid_trust_shared_are_valid_f32(const float shared[], size_t n_p);
+
+/* Adds them to the standard errors, and to the covariance what they have in common; bit a of `positive`: that of p[a]
+ * is relative. Cost: n_p square roots. */
+void pvid_trust_add_shared_f32(const float shared[], size_t n_p, uint32_t positive, pvid_estimate_f32 *candidate);
+
 /* The hash of the conditions for n_p parameters, continued from `hash`. */
 uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config, size_t n_p);
 

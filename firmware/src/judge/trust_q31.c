@@ -72,12 +72,12 @@ static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
     return PVID_OK;
 }
 
-/* Shared errors of n_p parameters. */
-PVID_COLD static bool shared_are_valid(const int32_t shared[], size_t n_p)
+PVID_COLD bool pvid_trust_shared_are_valid_q31(const int32_t shared[], size_t n_p)
 {
     bool valid = true;
+    const size_t count = (shared != NULL) ? n_p : 0u;
     size_t k = 0;
-    for (size_t a = 0; a < n_p; a++) {
+    for (size_t a = 0; a < count; a++) {
         valid = valid && (shared[k] >= 0);
         k++;
         for (size_t b = a + 1u; b < n_p; b++) {
@@ -107,7 +107,7 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
     if (status != PVID_OK) {
         return status;
     }
-    if ((config->shared != NULL) && !shared_are_valid(config->shared, estimator->model->n_p)) {
+    if (!pvid_trust_shared_are_valid_q31(config->shared, estimator->model->n_p)) {
         return PVID_BAD_SHARED;
     }
     memset(self, 0, sizeof *self);
@@ -300,10 +300,14 @@ PVID_COLD static int64_t part_of(int64_t x, int64_t y)
     return (y > 0) ? pvid_clamp_q31((x * PVID_ONE_Q30) / y, PVID_ONE_Q30) : PVID_ONE_Q30;
 }
 
-/* Adds the shared errors e. With se'^2 = se^2 + e^2, a correlation becomes
+/* With se'^2 = se^2 + e^2 of errors e, a correlation becomes
  * (se_a se_b correlation + e_a e_b shared correlation) / (se'_a se'_b). */
-PVID_COLD static void add_shared(const int32_t shared[], const pvid_model_q31 *model, pvid_estimate_q31 *candidate)
+PVID_COLD void pvid_trust_add_shared_q31(const int32_t shared[], const pvid_model_q31 *model,
+                                         pvid_estimate_q31 *candidate)
 {
+    if (shared == NULL) {
+        return;
+    }
     const size_t n_p = model->n_p;
     int64_t own[PVID_MAX_P];  /* se / se', Q30 */
     int64_t more[PVID_MAX_P]; /* e / se', Q30 */
@@ -433,9 +437,7 @@ pvid_reason pvid_trust_publish_q31(pvid_trust_q31 *self, pvid_estimator_q31 *est
         candidate->standing = self->standing.now;
         candidate->standing.age = 0;
         memcpy(self->own, candidate->se, sizeof self->own);
-        if (self->config.shared != NULL) {
-            add_shared(self->config.shared, estimator->model, candidate);
-        }
+        pvid_trust_add_shared_q31(self->config.shared, estimator->model, candidate);
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }

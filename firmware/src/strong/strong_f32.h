@@ -19,6 +19,7 @@
 
 #include "judge/gate_f32.h"
 #include "judge/misfit_f32.h"
+#include "judge/trust_f32.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "number/init.h"
@@ -291,6 +292,9 @@ static PVID_COLD pvid_status estimator_init(strong_estimator_f32 *self, const st
     if (config->exact_every > UINT8_MAX) {
         return PVID_BAD_DIVIDER;
     }
+    if (!pvid_trust_shared_are_valid_f32(config->shared, STRONG_P)) {
+        return PVID_BAD_SHARED;
+    }
     const uint32_t every = (estimator.law == PVID_LAW_PSEUDOVELOCITY) ? 1u : EXACT_EVERY;
     const uint32_t divider = estimator.divider;
     const float forgetting_rows = estimator.forgetting_s * rate_hz;
@@ -474,6 +478,7 @@ void STRONG(assess)(const strong_f32 *self, pvid_estimate_f32 *estimate)
     system_of(&self->estimator, &system);
     memcpy(estimate->p, self->estimator.p, sizeof self->estimator.p);
     pvid_assess_f32(&system, &settings, estimate);
+    pvid_trust_add_shared_f32(self->estimator.config->shared, STRONG_P, STRONG_POSITIVE, estimate);
     estimate->residual_sd /= unit[0];
 }
 

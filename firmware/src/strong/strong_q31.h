@@ -22,6 +22,7 @@
 
 #include "judge/gate_q31.h"
 #include "judge/misfit_q31.h"
+#include "judge/trust_q31.h"
 #include "number/count.h"
 #include "number/init.h"
 #include "number/rescale_q31.h"
@@ -116,6 +117,9 @@ static PVID_COLD pvid_status prepare(strong_q31 *self, const strong_config_q31 *
             return PVID_BAD_FORMAT;
         }
     }
+    if (!pvid_trust_shared_are_valid_q31(config->shared, STRONG_P)) {
+        return PVID_BAD_SHARED;
+    }
     pvid_estimator_config_q31 estimator = config->estimator;
     estimator.model = &strong_model;
     status = pvid_estimator_init_q31(&self->estimator, &estimator);
@@ -159,6 +163,7 @@ void STRONG(assess)(const strong_q31 *self, pvid_estimate_q31 *estimate)
 {
     if ((self != NULL) && (estimate != NULL)) {
         pvid_estimator_assess_q31(&self->estimator, estimate);
+        pvid_trust_add_shared_q31((self->config != NULL) ? self->config->shared : NULL, &strong_model, estimate);
     }
 }
 

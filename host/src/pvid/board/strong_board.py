@@ -16,13 +16,16 @@ from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
 from pvid.codegen.strong_library import StrongModelIdentifier, sizes_of_strong, strong_native
 from pvid.codegen.strong_twin import StrongModelTwin
 from pvid.configuration.nominal_run import nominal_run
-from pvid.configuration.strong import strong_design
+from pvid.configuration.strong import reference_of, strong_design
 from pvid.core.native import Native
 from pvid.link.frames import Configuration, Form
 from pvid.link.names import BoardNames, Quantity
 from pvid.model.strong import strong_form
 from pvid.models.mechanisms import constants_of
 from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.weak.failures import attempted
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import identify
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
@@ -49,16 +52,23 @@ class StrongBoard(FloatBoard):
     strong: StrongFunctions
 
     @classmethod
-    def of_recording(cls, rig: MechanismRig, recording: Recording) -> StrongBoard:
+    def of_recording(cls, rig: MechanismRig, recording: Recording, reference: Float | None = None) -> StrongBoard:
         """With the window and settings that a recording of the rig asks for; the board's sensors read it.
 
         Raises PvidError when the recording is too short, or the strong form of the model needs what the core does not
         have.
+
+        Parameters
+        ----------
+        reference : the truth of a simulation [n_p]; None: the weak form's estimate
         """
         recording.refuse_damaged()
         whole = recording.whole()
         compiled = rig.compiled()
-        made = strong_design(compiled, whole)
+        if reference is None:
+            found = attempted(lambda: identify(compiled, whole.run, whole.sample_rate))
+            reference = None if found is None else reference_of(found)
+        made = strong_design(compiled, whole, reference=reference)
         return cls(rig, compiled, made.config, made.samples[:MOST_TICKS], made.strong)
 
     @classmethod
@@ -66,8 +76,9 @@ class StrongBoard(FloatBoard):
         """That of a shipped mechanism, whose sensors read a simulation; raises as `of_recording`."""
         simulated = simulated_rig(name)
         rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
-        run = RigSimulation.of(rig.compiled(), simulated).run()
-        return cls.of_recording(rig, Recording(run.pop("t"), run, simulated.sample_rate))
+        simulation = RigSimulation.of(rig.compiled(), simulated)
+        run = simulation.run()
+        return cls.of_recording(rig, Recording(run.pop("t"), run, simulated.sample_rate), simulation.truth)
 
     @classmethod
     def of_guess(cls, rig: MechanismRig) -> StrongBoard:
@@ -75,7 +86,8 @@ class StrongBoard(FloatBoard):
 
         Raises PvidError where there is no such simulation (see `nominal_run`), and as `of_recording`.
         """
-        return cls.of_recording(rig, nominal_run(rig).recording)
+        nominal = nominal_run(rig)
+        return cls.of_recording(rig, nominal.recording, nominal.p)
 
     def __post_init__(self) -> None:
         refuse_slow(self.config.sample_rate)
@@ -128,6 +140,7 @@ class StrongBoard(FloatBoard):
     def text(self) -> str:
         """The rig file with the identifier's settings, for a log; `board_of` gives the same board back."""
         own = {name: getattr(self.config, name) for name in _OWN} | {"weights": self.config.weights.ravel()}
+        own |= {} if self.config.shared is None else {"shared": self.config.shared}
         for part in ("estimator", "gate"):
             settings = getattr(self.config, part)
             own |= {f"{part}_{one.name}": getattr(settings, one.name) for one in fields(settings)}
@@ -151,5 +164,6 @@ class StrongBoard(FloatBoard):
             **{**own, "row_sd": tuple(own["row_sd"]), "weights": array_of(own["weights"]).reshape(5, -1)},
             estimator=EstimatorConfig(**{**arrays, "law": Law(given["law"])}),
             gate=GateConfig(**part_of(settings, "gate")),
+            shared=array_of(settings["shared"]) if "shared" in settings else None,
         )
         return cls(rig, compiled, config, np.zeros((0, len(strong.signals)), np.float32), strong)

@@ -139,6 +139,7 @@ def build_image(board: Board, design: StrongDesign | StrongDesignQ31) -> tuple[P
             f"{name}_design_f32.h": files_strong_design.header(design.strong, design.config, MADE_BY),
         }
         sizes = sizes_of_strong(design.strong, design.config)
+        sizes |= {"PVID_SHARED": int(design.config.shared is not None)}
     else:
         name, ticks, core = design.strong_q31.name, len(design.counts), STRONG_FIXED.name
         files, sizes = files_strong_q31.files_of(design.strong_q31, MADE_BY), design.strong_q31.sizes

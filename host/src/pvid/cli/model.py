@@ -250,7 +250,7 @@ def build(
         weak, no_fixed_weak = _weak_q31(compiled, recording, functions, soft, found)
         options = replace(options, design=design, weak_q31_for_run=weak)
     if strong:
-        strong_design, strong_q31, no_fixed_strong = _strong_design_of(compiled, model, recording)
+        strong_design, strong_q31, no_fixed_strong = _strong_design_of(compiled, model, recording, found)
         options = replace(options, strong_design=strong_design, strong_q31=strong_q31)
     no_refinement = whole.refinement.refusal
     if design is not None and no_refinement is None:
@@ -283,16 +283,17 @@ def build(
 
 
 def _strong_design_of(
-    compiled: CompiledModel, model: str, recording: Recording | None
+    compiled: CompiledModel, model: str, recording: Recording | None, found: Identified | None
 ) -> tuple[StrongModelConfig | None, StrongQ31 | None, str | None]:
     """Of the strong form for the rig of a recording, or for the shipped rig of a shipped mechanism; the same in fixed
     point, or why there is none."""
-    from pvid.configuration.strong import strong_design
+    from pvid.configuration.strong import reference_of, strong_design
     from pvid.configuration.strong_q31 import fixed_design
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.rig.run import Recording
     from pvid.sim.simulated_run import simulation_of
 
+    reference = None if found is None else reference_of(found)
     if recording is None:
         if model not in names_of_shipped():
             return None, None, None
@@ -300,7 +301,8 @@ def _strong_design_of(
         run = simulation.run()
         signals = {one.name: run[one.name] for one in compiled.signals}
         recording = Recording(run["t"], signals, simulation.rig.sample_rate)
-    design = strong_design(compiled, recording)
+        reference = simulation.truth
+    design = strong_design(compiled, recording, reference=reference)
     try:
         return design.config, fixed_design(compiled, recording, design).strong_q31, None
     except PvidError as error:

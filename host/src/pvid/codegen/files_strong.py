@@ -24,6 +24,8 @@ typedef struct {{
     pvid_fir_bank_f32 bank; /* of all derivatives, see pvid/differentiator.h; five points are written out */
     float row_sd[{upper}_KINDS]; /* standard deviation of Y - N^T theta of each kind of row [unit of its Y], > 0 */
     pvid_gate_config_f32 gate;   /* outlier gate on the weighted innovations of an instant; zeros: none */
+    const float *shared;    /* what no row shows, derivatives' bias above all: as of pvid/trust.h, added to the standard
+                               errors. NULL: none. Must outlive the identifier */
     uint16_t exact_every;   /* rows from one exact projection to the next if divider is 1, 1..255; 0: 8, with the law
                                pseudovelocity 1 */
     pvid_estimator_config_f32 estimator; /* start, bounds, law ..; model, row_sd, update_rate_hz, noise_margin,

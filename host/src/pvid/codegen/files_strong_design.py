@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pvid.codegen import describe
 from pvid.codegen.c_text import guarded, initialised, inner, number
-from pvid.codegen.files_weak import fields_in_c, size_check
+from pvid.codegen.files_weak import fields_in_c, floats, size_check
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
 from pvid.design.c_tables import float_array
@@ -51,6 +51,7 @@ def header(strong: StrongFunctions, config: StrongModelConfig, command: str) -> 
         "sample_rate_hz": number(config.sample_rate),
         "bank": inner(bank),
         "row_sd": "{" + ", ".join(map(number, config.row_sd)) + "}",
+        "shared": "NULL" if config.shared is None else f"{name}_shared",
         "gate": inner(fields_in_c(config.gate)),
         "exact_every": config.exact_every,
         "estimator": inner(fields_in_c(own)),
@@ -64,6 +65,11 @@ def header(strong: StrongFunctions, config: StrongModelConfig, command: str) -> 
             f"{name}_weights", config.weights, "[order][point - 1], order k per point^k: pvid/differentiator.h"
         ),
         "",
+        *(
+            [floats(f"{name}_shared", config.shared, "errors that no row shows: trust.h"), ""]
+            if config.shared is not None
+            else []
+        ),
         initialised(f"static const {name}_config_f32 {name}_config", fields),
         "",
     ]

@@ -20,6 +20,8 @@ typedef struct {{
     pvid_bank_q31 bank; /* of all derivatives */
     int32_t full_scale[{upper}_SIGNALS]; /* of a reading about its offset, 1..2^24 [counts] */
     int32_t offset[{upper}_SIGNALS];     /* reading of each sensor at 0 [counts] */
+    const int32_t *shared;       /* what no row shows, derivatives' bias above all: as of pvid/trust_q31.h, added to the
+                                    standard errors. NULL: none. Must outlive the identifier */
     uint32_t rows_per_second;    /* 1..2^30, for the memories of gate and alarm */
     pvid_gate_config_q31 gate;   /* outlier gate on the innovations of an instant; zeros: none */
     pvid_estimator_config_q31 estimator; /* start, bounds, formats ..; model is ignored. divider: rows from solve to
@@ -286,6 +288,7 @@ def design_header(strong_q31: StrongQ31, command: str) -> str:
         "bank": inner(bank),
         "full_scale": _listed(config.full_scale),
         "offset": _listed(config.offset),
+        "shared": f"{name}_shared_q31" if config.shared is not None else "NULL",
         "rows_per_second": f"{config.rows_per_second}u",
         "gate": f"{{{', '.join(fields_of(config.gate))}}}",
         "estimator": "\n".join(["{", *(f"        {one}," for one in fields_of(own)), "    }"]),
@@ -297,6 +300,7 @@ def design_header(strong_q31: StrongQ31, command: str) -> str:
         "",
         numbers("PVID_TABLE int32_t", f"{name}_weights_q31", config.weights.ravel().tolist()),
         "",
+        *([numbers("int32_t", f"{name}_shared_q31", config.shared), ""] if config.shared is not None else []),
         initialised(f"static const {name}_config_q31 {name}_config", settings),
         "",
     ]

@@ -275,7 +275,7 @@ def shared_errors(causes: Sequence[str]) -> list[str]:
     )
 
 
-def _floats(name: str, values: Float32, comment: str) -> str:
+def floats(name: str, values: Float32, comment: str) -> str:
     rows = [values[k : k + _WIDTH] for k in range(0, len(values), _WIDTH)]
     lines = ["    " + ", ".join(float_literal(x) for x in row) + "," for row in rows]
     return "\n".join([f"/* {comment} */", f"static const float {name}[{values.size}] = {{", *lines, "};"])
@@ -294,24 +294,24 @@ def _design_tables(design: WeakDesign32) -> list[str]:
         key = one.weights.tobytes()
         if key not in arrays:
             arrays[key] = f"{name}_filter_{len(arrays)}"
-            parts.append(_floats(arrays[key], one.weights, f"derivative {jet.order}, from the centre outwards"))
+            parts.append(floats(arrays[key], one.weights, f"derivative {jet.order}, from the centre outwards"))
         filters.append(f"{{{one.half}, {arrays[key]}}}")
     noise = [f"{{{x.kind}, {x.power}, {x.a}, {x.b}, {float_literal(x.factor)}}}" for x in design.noise]
     parts += [
         table("pvid_weak_filter_f32", f"{name}_filter", f"{upper}_JETS", filters),
-        _floats(f"{name}_circle", design.circle, "sin(pi j / hop)"),
+        floats(f"{name}_circle", design.circle, "sin(pi j / hop)"),
     ]
     if noise:
         parts.append(table("pvid_weak_noise_f32", f"{name}_noise", str(len(noise)), noise))
     orders = ", ".join(map(str, design.error_order.tolist()))
     parts += [
         f"static const uint8_t {name}_error_order[{upper}_KINDS] = {{{orders}}};",
-        _floats(f"{name}_error_variance", design.error_variance, "of the equations' own errors"),
+        floats(f"{name}_error_variance", design.error_variance, "of the equations' own errors"),
     ]
     if design.model.signs:
-        parts.append(_floats(f"{name}_sign_width", design.sign_width, "0: the mean of the sign over a step"))
+        parts.append(floats(f"{name}_sign_width", design.sign_width, "0: the mean of the sign over a step"))
     if design.sign_doubt is not None:
-        parts.append(_floats(f"{name}_sign_doubt", design.sign_doubt, "of slower motion the sign is in doubt"))
+        parts.append(floats(f"{name}_sign_doubt", design.sign_doubt, "of slower motion the sign is in doubt"))
     return ["\n\n".join(parts)]
 
 
@@ -347,7 +347,7 @@ def _checks(config: WeakConfig) -> list[str]:
         one
         for field, (values, comment) in given.items()
         if values is not None
-        for one in (_floats(f"{name}_{field}", values, comment), "")
+        for one in (floats(f"{name}_{field}", values, comment), "")
     ]
 
 

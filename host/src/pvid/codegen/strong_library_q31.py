@@ -12,7 +12,7 @@ from pvid.codegen import files_strong_q31
 from pvid.codegen.strong_q31 import StrongQ31
 from pvid.core.headers import Filled
 from pvid.core.model_library import ModelSources
-from pvid.core.native import Native, Stepper
+from pvid.core.native import Arithmetic, Native, OfEstimator, Stepper
 from pvid.core.sizes import roomy
 from pvid.settings.cores import STRONG_FIXED
 from pvid.settings.record import Record
@@ -93,6 +93,9 @@ class StrongIdentifierQ31(Stepper):
     def estimator(self) -> Any:
         """pvid_estimator_q31 in it."""
         return self.state.estimator
+
+    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
+        return OfEstimator(arithmetic.any_model.sizes, f"{self._name}_assess_q31", of_identifier=True)
 
     def run_samples(self, readings: npt.ArrayLike, *, sums: bool = True, estimate_every: int = 0) -> Record:
         """Steps through readings [ticks, signals]."""

@@ -25,7 +25,7 @@ from pvid.twin.state import take_over
 
 _CORE = (
     *("assess_f32", "cholesky_f32", "differentiator_f32", "elementary_f32", "finite_f32"),
-    *("fnv", "gate_f32", "misfit_f32", "settings_f32"),
+    *("fnv", "gate_f32", "misfit_f32", "settings_f32", "trust_f32"),
 )
 _MADE_BY = "the twin"
 _LAYOUT = """\

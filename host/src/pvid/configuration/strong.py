@@ -2,7 +2,8 @@
 
 Longer windows take the noise out of the derivatives, shorter ones follow the motion: noise in the regressors biases an
 estimate one way, a polynomial that is too stiff the other. Both show as a change of p with the window, so the window is
-the one at which this change and the scatter of the rows are least together.
+the one at which this change and the scatter of the rows are least together. There the bias changes least; it need not
+be small. So the standard errors contain the distance from an estimate without derivatives, that of the weak form.
 """
 
 from __future__ import annotations
@@ -15,12 +16,15 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
+from pvid.configuration.shared import Shared
 from pvid.design.fir import MAX_DEGREE, savitzky_golay
 from pvid.model.compiled import CompiledModel
 from pvid.model.strong import strong_form
 from pvid.oracle.strong_described import StrongModel, StrongSettings, all_rows, residuals, standard_errors
 from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import Identified
 from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.shared import Cause
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
 from pvid.settings.parts import EstimatorConfig
@@ -49,6 +53,7 @@ class Fitted:
     p : [n_p]
     noise : standard errors from the scatter of the rows [n_p]
     change : largest change of p to the next shorter and the next longer window [n_p]
+    bias : p less that of the weak form, where it has one; else 0 [n_p]
     """
 
     taps: int
@@ -56,10 +61,16 @@ class Fitted:
     p: Float
     noise: Float
     change: Float
+    bias: Float
+
+    @property
+    def shared(self) -> Float:
+        """What no row shows [n_p]."""
+        return np.hypot(self.change, self.bias)
 
     @property
     def error(self) -> Float:
-        """Both together [n_p]."""
+        """By the scatter and the change [n_p]."""
         return np.hypot(self.noise, self.change)
 
 
@@ -72,20 +83,28 @@ class StrongDesign:
     strong : functions of the strong form, named NAME_strong
     config : settings in float32
     fitted : the estimate in float64 with the same window
+    shared : errors that no row shows
     samples : of the recording, float32 [ticks, signals]
     """
 
     strong: StrongFunctions
     config: StrongModelConfig
     fitted: Fitted
+    shared: Shared
     samples: npt.NDArray[np.float32]
 
 
-def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY) -> StrongDesign:
+def strong_design(
+    model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY, reference: Float | None = None
+) -> StrongDesign:
     """Window and settings for a recording without missing samples.
 
     Raises PvidError where the recording is too short, or the strong form of the model needs what the core does not
     have.
+
+    Parameters
+    ----------
+    reference : p of the weak form, or the truth of a simulation; NaN where there is none [n_p]
     """
     strong = renamed(strong_functions_of(strong_form(model)))
     oracle = StrongModel(model)
@@ -98,7 +117,14 @@ def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STA
             break
     if best is None:
         raise PvidError(f"{len(recording)} samples are too few for derivatives of order {oracle.order}")
+    if reference is not None:
+        best = replace(best, bias=np.nan_to_num(best.p - reference))
     return _designed(strong, oracle, recording, best, law)
+
+
+def reference_of(found: Identified) -> Float:
+    """What the errors of the strong form are measured by: p of the weak form, NaN where it determines none [n_p]."""
+    return np.where([one.status == "not_identified" for one in found.judged], np.nan, found.p)
 
 
 def five_point_design(model: CompiledModel, recording: Recording) -> StrongDesign:
@@ -111,7 +137,7 @@ def five_point_design(model: CompiledModel, recording: Recording) -> StrongDesig
     rows = oracle.rows(recording.signals, recording.sample_rate, StrongSettings(*_FIVE_POINTS, 1))
     p, weights = all_rows(oracle.parameters, rows, oracle.parameters.checked(None))
     noise = standard_errors(oracle.parameters, rows, p, weights, _FIVE_POINTS[0])
-    return _designed(strong, oracle, recording, Fitted(*_FIVE_POINTS, p, noise, np.zeros_like(p)), Law.STATIONARY)
+    return _designed(strong, oracle, recording, Fitted(*_FIVE_POINTS, p, noise, *np.zeros((2, len(p)))), Law.STATIONARY)
 
 
 def _designed(
@@ -119,8 +145,10 @@ def _designed(
 ) -> StrongDesign:
     samples = np.stack([np.asarray(recording.signals[one.name], np.float32) for one in strong.signals], axis=1)
     sd = _residual_sd(oracle, recording, fitted)
+    causes = [Cause("another window", fitted.change), Cause("the weak form", fitted.bias)]
+    shared = Shared.of(fitted.p, oracle.parameters.positive, causes)
     config = _config(oracle.parameters, recording.sample_rate, fitted, law, sd)
-    return StrongDesign(strong, config, fitted, samples)
+    return StrongDesign(strong, replace(config, shared=shared.triangle), fitted, shared, samples)
 
 
 def _fits(oracle: StrongModel, recording: Recording, degree: int) -> Iterator[Fitted]:
@@ -136,7 +164,7 @@ def _fits(oracle: StrongModel, recording: Recording, degree: int) -> Iterator[Fi
             return
         p, weights = all_rows(oracle.parameters, rows, start)
         noise = standard_errors(oracle.parameters, rows, p, weights, max(1, -(-taps // _EVERY)))
-        yield Fitted(taps, degree, p, noise, np.zeros_like(p))
+        yield Fitted(taps, degree, p, noise, *np.zeros((2, len(p))))
         taps = max(round(_STEP * taps), taps + 2) | 1
 
 

@@ -63,10 +63,12 @@ class StrongDesignQ31:
         return self.strong_q31.config
 
 
-def strong_design_to_identify(model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY) -> StrongDesignQ31:
+def strong_design_to_identify(
+    model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY, reference: Float | None = None
+) -> StrongDesignQ31:
     """Formats and settings for a recording without missing samples, with the window that float32 gets; raises as
     fixed_design."""
-    return fixed_design(model, recording, strong_design(model, recording, law), between_counts=True)
+    return fixed_design(model, recording, strong_design(model, recording, law, reference), between_counts=True)
 
 
 def fixed_design(
@@ -78,7 +80,7 @@ def fixed_design(
 
     Parameters
     ----------
-    between_counts : as of pvid.configuration.weak_q31.weak_q31_for_run
+    between_counts : as of pvid.configuration.weak_q31.weak_q31_for_run; the core's errors are those of the rows alone
     """
     strong, fitted = base.strong, base.fitted
     bank = savitzky_golay(fitted.taps, fitted.degree)
@@ -118,6 +120,7 @@ def fixed_design(
             correlation=round(base.config.estimator.correlation * 2**16),
             divider=base.config.estimator.divider,
         ),
+        shared=None if between_counts else base.shared.counts(made.parameters.p_bits),
         raw=_raw(made, lsb),
         integral_down=down,
     )

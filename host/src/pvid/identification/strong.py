@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,13 @@ import numpy as np
 from pvid.base.wording import listed
 from pvid.codegen.strong_library import strong_native
 from pvid.codegen.strong_library_q31 import StrongNativeQ31
-from pvid.configuration.strong import StrongDesign, strong_design
+from pvid.configuration.strong import StrongDesign, reference_of, strong_design
 from pvid.configuration.strong_q31 import strong_design_to_identify
-from pvid.identification.analysis import refuse_constant
+from pvid.identification.analysis import analysed, refuse_constant
 from pvid.identification.answer import Answer, Value
 from pvid.identification.values import unless_held, values_of
 from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Verdict
@@ -29,8 +30,8 @@ _UNKNOWN_OF_RANGE = 0.5  # as in the verdict of the weak form
 _CLASH = 3.0  # standard errors between the core and the analysis
 _GOOD = (Reason.UPDATED, Reason.MISFIT, Reason.ACCUMULATED)
 _BIAS = (
-    "The strong form differentiates the samples, and their noise biases its regressors; the standard errors contain "
-    "what another window changes, not all of it. The weak form (omit --form strong) has no such bias."
+    "The strong form differentiates the samples, and their noise biases its regressors; the standard errors contain {}"
+    ". The weak form (omit --form strong) has no such bias."
 )
 
 
@@ -112,8 +113,10 @@ def identify_strong_mechanism(
     core : f32, q31; f64: the analysis
     """
     refuse_constant(recording, model)
-    fixed = strong_design_to_identify(model, recording, law) if core == STRONG_FIXED.name else None
-    design = strong_design(model, recording, law) if fixed is None else fixed.base
+    found = attempted(lambda: analysed(recording, model).found)
+    reference = None if found is None else reference_of(found)
+    fixed = strong_design_to_identify(model, recording, law, reference) if core == STRONG_FIXED.name else None
+    design = strong_design(model, recording, law, reference) if fixed is None else fixed.base
     fitted = design.fitted
     reason: Reason | None = None
     running: int | None = None
@@ -125,20 +128,21 @@ def identify_strong_mechanism(
         noise = np.maximum(noise, fixed.strong_q31.values(stepped.assess()["se"][: len(p)]))
         reason, running = _last(record.reason.tolist()), stepped.running_hash
     elif core == STRONG.name:
-        identifier = strong_native(design.strong, design.config).identifier_of(design.config)
+        rows_alone = replace(design.config, shared=None)
+        identifier = strong_native(design.strong, rows_alone).identifier_of(rows_alone)
         record = identifier.run_samples(design.samples, sums=False)
         p = record.p[-1].astype(np.float64)
         n_p = len(p)
         noise = np.maximum(noise, identifier.assess()["se"][:n_p].astype(np.float64))
         reason, running = _last(record.reason.tolist()), identifier.running_hash
-    unknown = tuple(_unknown(model, p, np.hypot(noise, fitted.change)))
+    unknown = tuple(_unknown(model, p, np.hypot(noise, fitted.shared)))
     identified = not unknown and (reason is None or reason in _GOOD)
     held = None if identified else "the strong form does not determine every parameter"
     judged = unless_held([Judged()] * len(p), held)
-    # What another window changes is common to all parameters, as a gain is.
+    # What another window or the weak form changes is common to all parameters, as a gain is.
     verdict = Verdict(tuple(_doubts(model, p, design, noise, unknown, held)))
-    change = fitted.change[np.newaxis]
-    values = values_of(model, p, np.diag(noise**2), change, judged, verdict, of_known=False)
+    shared = np.stack([fitted.change, fitted.bias])
+    values = values_of(model, p, np.diag(noise**2), shared, judged, verdict, of_known=False)
     return StrongAnswer(model, design, values, core, reason, running, verdict, unknown, recording)
 
 
@@ -164,8 +168,9 @@ def _doubts(
         yield Doubt("not_identified", f"The strong form does not determine {listed(unknown)} from this recording.")
     elif held is not None:
         yield Doubt("not_identified", "The strong form has published no estimate.")
-    yield Doubt("noise", _BIAS)
     fitted = design.fitted
+    known = "their distance from the weak form" if fitted.bias.any() else "what another window changes, not all of it"
+    yield Doubt("noise", _BIAS.format(known))
     bounds = _CLASH * np.hypot(noise, fitted.error)
     apart = [one for one, x, y, most in zip(model.p_names, p, fitted.p, bounds, strict=True) if abs(x - y) > most]
     if apart:

@@ -24,6 +24,7 @@ class StrongModelConfig(Folded):
     row_sd : expected standard deviation of Y - N^T theta of each kind of row [unit of its Y]
     estimator : its row_sd is ignored
     gate : on the weighted innovations of an instant
+    shared : errors that no row shows, as of trust.h [n_p (n_p + 1) / 2]
     exact_every : rows from one exact projection to the next, with divider 1; 0: 8, with the paper's law 1
     """
 
@@ -33,6 +34,7 @@ class StrongModelConfig(Folded):
     row_sd: tuple[float, ...]
     estimator: EstimatorConfig
     gate: GateConfig = field(default_factory=GateConfig)
+    shared: npt.NDArray[np.float32] | None = None
     exact_every: int = 0
     block: int = 1
 
@@ -56,6 +58,7 @@ class StrongModelConfigQ31(Folded):
     rows_per_second : for the memories of gate and alarm
     estimator : rows are in standard deviations, row_sd 2^(8 + y_bits)
     gate : on the innovations of an instant
+    shared : errors that no row shows, as of trust_q31.h
     raw : place of an input that is a signal -> the signal, and from its count to the input; for integrals
     integral_down : shift of each integral to a count
     """
@@ -71,5 +74,6 @@ class StrongModelConfigQ31(Folded):
     rows_per_second: int
     estimator: EstimatorConfigQ31
     gate: GateConfigQ31 = GateConfigQ31()
+    shared: tuple[int, ...] | None = None
     raw: Mapping[int, tuple[int, Rescale]] = field(default_factory=dict)
     integral_down: tuple[int, ...] = ()
