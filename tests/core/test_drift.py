@@ -15,6 +15,7 @@ from pvid.identification.core import identify_in_c
 from pvid.model import Model
 from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
+from pvid.model.strong import strong_form
 from pvid.rig.run import Recording
 
 Float = npt.NDArray[np.float64]
@@ -160,6 +161,12 @@ def test_the_printed_weak_form_follows_the_heat_with_the_bits_of_its_twin() -> N
     assert core.is_published and record.p[-1, 5] == pytest.approx(11.3, abs=0.5)
     assert_equals_the_twin(native, config, samples_of(config, hot.signals)[9000:14000])
     assert identify_in_c(answer).values["R"].value == pytest.approx(1.2, rel=1e-3)
+
+
+def test_what_follows_no_drift_names_what_does() -> None:
+    """Float64 does not: its analysis takes the unknowns for constant."""
+    with pytest.raises(PvidError, match="a drift of its unknowns, .* the weak form in float32 follows it"):
+        strong_form(heating())
 
 
 def test_a_drift_that_cannot_be_is_refused() -> None:

@@ -336,11 +336,12 @@ class CompiledModel:
     def refuse_constraints(self, what: str) -> None:
         """PvidError where there are any, or drifts, by what keeps none."""
         if self.constraints or self.drifts:
-            kind = "constraints between" if self.constraints else "a drift of"
-            raise PvidError(
-                f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in float64 and "
-                "float32 does"
+            kind, by = (
+                ("constraints between", "float64 and float32 does")
+                if self.constraints and not self.drifts
+                else ("a drift of", "float32 follows it")
             )
+            raise PvidError(f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in {by}")
 
     def refuse_robot(self, what: str = "this command") -> None:
         """PvidError by what takes no robot."""
