@@ -2,7 +2,6 @@
 
 import gc
 import os
-import subprocess
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -67,6 +66,7 @@ def pytest_configure(config: pytest.Config) -> None:
     keep_freed()
     gc.set_threshold(50_000, 20, 100)  # modules and SymPy's expressions live to the end: 5 % of the time found nothing
     config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and with --long")
+    config.addinivalue_line("markers", "longer: has a long form without a number of ticks")
     config.addinivalue_line("markers", "long: with --long alone, in `./tools/test night`")
     config.addinivalue_line("markers", "by_day(number): its first cases; the others in `./tools/test night`")
     config.addinivalue_line("markers", "slow: left out of `./tools/test quick`")
@@ -142,16 +142,3 @@ def _no_board_is_left_running() -> Iterator[None]:
 def native() -> Native:
     """The build that tools/pvid uses."""
     return Native()
-
-
-@pytest.fixture(scope="session")
-def matrix(request: pytest.FixtureRequest, native: Native) -> dict[str, Native]:
-    """The core by compiler and level (gcc-O2 ...): as it is shipped, and at -O3; in the long form at all levels."""
-    others = ["gcc-O0", "clang-O0", "clang-O2"] if request.config.getoption("--long") else []
-    names = ["gcc-O3", "clang-O3", *others]
-    command = [str(ROOT / "tools" / "build-matrix"), *names]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    built = {Path(line).parent.name: Native(Path(line)) for line in done.stdout.splitlines()}
-    assert list(built) == names
-    return {"gcc-O2": native, **built}

@@ -69,7 +69,7 @@ done
 exec "{gcc}" "$@" -O0 {options} -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
 """
 # What tests compile and keep, under build/.
-KEPT = ("matrix", "cache/models", "cache/plants")
+KEPT = ("cache/models", "cache/plants")
 ASIDE = ROOT / "build" / "aside"
 
 

@@ -23,19 +23,20 @@ TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s
 Measured = dict[sizes.Configuration, tuple[sizes.Footprint, ReplayReport]]
 
 
-# The short form: a processor with an FPU and one without; an AVR; and one form on all of them.
+# The short form: a processor with an FPU and one without; an AVR; and one form on RISC-V, in the long form on all.
 FEW = ("mps2-an386", "microbit", *sizes.ON_AVR)
-ON_ALL = ("weak", "f32")
+RISC_V, ON_ALL = "virt-rv32imac", ("weak", "f32")
 
 
 @pytest.fixture(scope="module")
 def measured(request: pytest.FixtureRequest) -> Measured:
     """Configurations of `pvid sizes`, built and run: in the long form all."""
-    return {
-        one: sizes.measure(one)
-        for one in sizes.CONFIGURATIONS
-        if request.config.getoption("--long") or (one.form, one.core) == ON_ALL or one.board.name in FEW
-    }
+
+    def is_measured(one: sizes.Configuration) -> bool:
+        few = one.board.name in FEW or (one.board.name == RISC_V and (one.form, one.core) == ON_ALL)
+        return few or bool(request.config.getoption("--long"))
+
+    return {one: sizes.measure(one) for one in sizes.CONFIGURATIONS if is_measured(one)}
 
 
 @cache
@@ -64,8 +65,11 @@ def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -
     assert report.hash == int(expected[-1])
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(("form", "core"), FORMS_AND_CORES)
-def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measured: Measured) -> None:
+def test_every_board_computes_the_bits_of_the_host(
+    form: str, core: str, measured: Measured, request: pytest.FixtureRequest
+) -> None:
     boards = set()
     for configuration, (_, report) in measured.items():
         if (configuration.form, configuration.core) == (form, core):
@@ -76,7 +80,8 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
                 expected = expected[: report.ticks]
             assert_same_hashes(report, expected)
             boards.add(board.name)
-    wanted = BOARDS if (form, core) == ON_ALL else FEW
+    on_all = BOARDS if request.config.getoption("--long") else (*FEW, RISC_V)
+    wanted = on_all if (form, core) == ON_ALL else FEW
     there = {one.board.name for one in sizes.CONFIGURATIONS if (one.form, one.core) == (form, core)}
     assert boards >= there.intersection(wanted)
 
@@ -109,12 +114,14 @@ def test_the_weak_form_in_integers_keeps_its_limits(measured: Measured) -> None:
         assert measured[sizes.Configuration(BOARDS[board], "weak", "q31")][1].state_bytes <= 4096, board
 
 
+@pytest.mark.longer
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:
     footprints = {configuration: footprint for configuration, (footprint, _) in measured.items()}
     over = sizes.over_budget(ROOT / "tests" / "budget.toml", footprints)
     assert not over, "accept: ./tools/pvid sizes --budget tests/budget.toml --data host/docs/benchmarks"
 
 
+@pytest.mark.longer
 def test_the_table_of_results_has_what_is_measured(measured: Measured) -> None:
     shown = {row[:2]: row[2:] for row in results_of("sizes").rows}
     for row in sizes.table_rows({configuration: footprint for configuration, (footprint, _) in measured.items()}):
@@ -122,6 +129,7 @@ def test_the_table_of_results_has_what_is_measured(measured: Measured) -> None:
         assert figures == pytest.approx([int(cell) for cell in row[2:]], rel=0.02), row
 
 
+@pytest.mark.longer
 def test_the_stack_that_is_seen_lies_within_the_bound(measured: Measured) -> None:
     for configuration, (footprint, report) in measured.items():
         assert 0 < footprint.stack_seen <= footprint.stack_bound < report.stack_size, configuration.name

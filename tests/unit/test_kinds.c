@@ -1,4 +1,5 @@
-/* Rows of several kinds: M by blocks, against dense arithmetic in double; what init and add refuse. */
+/* Rows of several kinds: M by blocks, against dense arithmetic in double; what init and add refuse. That their
+ * parameters are those of least squares: tests/core/test_kinds.py. */
 #include "test.h"
 
 #include "identity_q31.h"
@@ -262,34 +263,6 @@ static void kinds_divide_theta_or_are_refused(void **state)
     assert_int_equal(init_with(2, back, 21), PVID_BAD_MODEL);
 }
 
-/* The solution of three rows of each kind without noise. */
-static void several_kinds_find_their_parameters(void **state)
-{
-    const float truth[N_P] = {1.25f, 0.75f, 3.0f};
-    const pvid_estimator_config_f32 fresh = config();
-    pvid_estimator_f32 estimator;
-    float theta[N_THETA];
-    theta_of(truth, theta);
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &fresh), PVID_OK);
-    for (int group = 0; group < 200; group++) {
-        for (size_t kind = 0; kind < N_KINDS; kind++) {
-            const pvid_block block = block_of(pvid_kind_first(kind_end, kind));
-            float n[3];
-            float y = 0.0f;
-            for (size_t i = 0; i < block.n; i++) {
-                n[i] = integer();
-                y += n[i] * theta[block.first + i];
-            }
-            assert_int_equal(pvid_estimator_add_kind_f32(&estimator, (uint8_t)kind, n, y), PVID_ACCUMULATED);
-        }
-        assert_int_equal(pvid_estimator_update_f32(&estimator), PVID_UPDATED);
-    }
-    for (size_t a = 0; a < N_P; a++) {
-        assert_true(fabsf(estimator.p[a] - truth[a]) < 1.0e-5f); /* float32, and the prior's pull of row_sd^2 / M */
-    }
-    assert_int_equal(estimator.counters.rows, 600);
-}
-
 /* b, behind the moments in the sums. */
 static float b_of(const pvid_estimator_f32 *estimator, size_t i)
 {
@@ -369,37 +342,6 @@ static pvid_estimator_config_q31 fixed_config(void)
         fresh.p_bits[a] = 24;
     }
     return fresh;
-}
-
-static void fixed_point_finds_the_parameters_of_several_kinds(void **state)
-{
-    const float truth[N_P] = {1.25f, 0.75f, 3.0f};
-    const pvid_estimator_config_q31 fresh = fixed_config();
-    pvid_estimator_q31 estimator;
-    float theta[N_THETA];
-    theta_of(truth, theta);
-    assert_int_equal(pvid_estimator_init_q31(&estimator, &fresh), PVID_OK);
-    assert_int_equal(estimator.information.n_sums, MOMENTS + N_THETA + 2);
-    for (int group = 0; group < 200; group++) {
-        for (size_t kind = 0; kind < N_KINDS; kind++) {
-            const pvid_block block = block_of(pvid_kind_first(kind_end, kind));
-            int32_t n[3];
-            float y = 0.0f;
-            for (size_t i = 0; i < block.n; i++) {
-                const float entry = integer();
-                n[i] = (int32_t)entry;
-                y += entry * theta[block.first + i];
-            }
-            assert_int_equal(pvid_estimator_add_kind_q31(&estimator, (uint8_t)kind, n, (int32_t)(y * 1024.0f)),
-                             PVID_ACCUMULATED);
-        }
-        assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
-    }
-    for (size_t a = 0; a < N_P; a++) { /* 2^-10 of Y, and the prior's pull */
-        assert_true(fabsf(((float)estimator.p[a] / 16777216.0f) - truth[a]) < 1.0e-4f);
-    }
-    const int32_t n[3] = {0};
-    assert_int_equal(pvid_estimator_add_kind_q31(&estimator, N_KINDS, n, 0), PVID_NOT_READY);
 }
 
 static void a_fixed_point_vector_is_added_to_b_or_refused(void **state)
@@ -495,9 +437,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test(rows_go_to_the_block_of_their_kind),
     cmocka_unit_test(products_with_blocks_equal_dense_products),
     cmocka_unit_test(kinds_divide_theta_or_are_refused),
-    cmocka_unit_test(several_kinds_find_their_parameters),
     cmocka_unit_test(a_vector_is_added_to_b_or_refused),
-    cmocka_unit_test(fixed_point_finds_the_parameters_of_several_kinds),
     cmocka_unit_test(a_fixed_point_vector_is_added_to_b_or_refused),
     cmocka_unit_test(a_fixed_point_model_is_whole_or_refused),
     cmocka_unit_test(formats_of_theta_follow_the_start),
