@@ -1,6 +1,7 @@
 """What tools/release runs: the parts of a release, each built from what is committed and tested in a clean folder."""
 
 import argparse
+import email
 import hashlib
 import json
 import os
@@ -11,7 +12,11 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Iterable, Sequence
+from importlib import metadata
 from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 OUT = ROOT / "build" / "release"
@@ -20,6 +25,7 @@ PACKAGES = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx")
 CORES = ("f32", "q31")
 G = 9.5  # [m/s^2] of the rig that `pvid simulate` takes
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest of a zip: the same files make the same archive on every day
+_EPOCH = "315532800"  # the same, of a wheel
 _C99 = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-maybe-uninitialized", "-O1", "-I.", "-c")
 # What host/pyproject.toml says of folders above its own, which a source distribution does not have.
 _UPWARD = {
@@ -120,6 +126,45 @@ def wheel_of(source: Path, out: Path, what: str) -> Path:
     run(*command, "-w", out, source, cwd=out, failure=f"the wheel cannot be built from {what}")
     (found,) = out.glob("*.whl")
     return found
+
+
+def check_again(source: Path, wheel: Path, folder: Path) -> None:
+    """Refuses a wheel whose second build, in another folder, has other bytes."""
+    shutil.copytree(source, folder / "source")
+    if wheel_of(folder / "source" / "host", folder, "the source archive").read_bytes() != wheel.read_bytes():
+        raise RefusalError(f"a second build of {wheel.name} has other bytes.")
+
+
+def required(of: Iterable[str]) -> dict[str, str]:
+    """Distributions that meet requirements, and all that these require, with their versions here."""
+    found: dict[str, str] = {}
+    left = [Requirement(one) for one in of]
+    while left:
+        one = left.pop()
+        name = canonicalize_name(one.name)
+        if name not in found and (one.marker is None or one.marker.evaluate({"extra": ""})):
+            found[name] = metadata.version(name)
+            left += [Requirement(further) for further in metadata.requires(name) or []]
+    return dict(sorted(found.items()))
+
+
+def bill_of_materials(wheel: Path, version: str, out: Path) -> Path:
+    """What the wheel contains and requires of others, as CycloneDX, in the versions with which it was tested."""
+
+    def component(name: str, version: str, kind: str = "pypi") -> dict[str, str]:
+        return {"type": "library", "name": name, "version": version, "purl": f"pkg:{kind}/{name}@{version}"}
+
+    with zipfile.ZipFile(wheel) as archive:
+        (about,) = (one for one in archive.namelist() if one.endswith(".dist-info/METADATA"))
+        wanted = email.message_from_bytes(archive.read(about)).get_all("Requires-Dist", [])
+        plots = archive.read("pvid/show/web/uplot.js")[:200].decode()
+    of_others = [component("uplot", re.findall(r"v(\d+\.\d+\.\d+)", plots)[0], "npm")]
+    of_others += [component(*one) for one in required(wanted).items()]
+    whole = {"bomFormat": "CycloneDX", "specVersion": "1.5", "version": 1}
+    whole |= {"metadata": {"component": component("pvid", version)}, "components": of_others}
+    path = out / f"pvid-{version}-sbom.cdx.json"
+    path.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
+    return path
 
 
 def sdist_of(source: Path, out: Path, folder: Path) -> Path:
@@ -241,7 +286,7 @@ def build(version: str, out: Path) -> list[Path]:
     out.mkdir(parents=True)
     with tempfile.TemporaryDirectory(prefix="pvid-release-") as name:
         clean = Path(name)
-        for one in ("archive", "sdist", "again", "run", "deploy"):
+        for one in ("archive", "sdist", "again", "twice", "run", "deploy"):
             (clean / one).mkdir()
         say("source archive")
         archive = source_archive(ROOT, version, out)
@@ -249,12 +294,16 @@ def build(version: str, out: Path) -> list[Path]:
         check_sources(source, clean / "cmake")
         say("wheel")
         wheel = wheel_of(source / "host", out, "the source archive")
+        check_again(source, wheel, clean / "twice")
         python = bare_environment(wheel, clean / "venv")
         check_wheel(python, version, clean / "run")
+        say("bill of materials, documentation")
+        packages = [bill_of_materials(wheel, version, out)]
+        run(sys.executable, "-P", "tools/docs.py", cwd=source, failure="the documentation cannot be built")
+        packages.append(zipped(source / "build" / "site", out / f"pvid-{version}-docs.zip"))
         say("sdist")
         sdist = sdist_of(source, out, clean / "sdist")
         check_sdist(sdist, wheel, clean / "again")
-        packages = []
         wanted = [*((one, "f32") for one in PACKAGES), *(("amalgamation", core) for core in CORES)]
         for target, core in wanted:
             say(f"{MECHANISM} for {target}, {core}")
@@ -271,6 +320,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="tools/release", description=__doc__)
     parser.add_argument("--rehearse", action="store_true", help="report what forbids a release, and build all the same")
     rehearse = parser.parse_args(arguments).rehearse
+    os.environ["SOURCE_DATE_EPOCH"] = _EPOCH
     try:
         for check in (check_tree, check_versions, check_changes):
             try:

@@ -1,5 +1,6 @@
 """tools/release refuses what is no release, and packs what is committed."""
 
+import json
 import re
 import subprocess
 import sys
@@ -126,6 +127,16 @@ def test_equal_files_make_equal_zips(tmp_path: Path) -> None:
     first, second = (release.zipped(tmp_path / name, tmp_path / f"out-{name}" / "it.zip") for name in ("one", "two"))
     assert first.read_bytes() == second.read_bytes()
     assert zipfile.ZipFile(first).namelist() == ["it/src/it.c"]
+
+
+def test_the_bill_of_materials_has_what_the_wheel_contains_and_what_its_requirements_require(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.whl", "w") as wheel:
+        wheel.writestr("pvid-1.2.3.dist-info/METADATA", "Requires-Dist: sympy>=1\nRequires-Dist: no; extra == 'x'\n")
+        wheel.writestr("pvid/show/web/uplot.js", "/*! uPlot (v1.6.32) */")
+    told = json.loads(release.bill_of_materials(tmp_path / "a.whl", "1.2.3", tmp_path).read_text(encoding="utf-8"))
+    assert (told["bomFormat"], told["metadata"]["component"]["version"]) == ("CycloneDX", "1.2.3")
+    assert [one["name"] for one in told["components"]] == ["uplot", "mpmath", "sympy"]
+    assert told["components"][0]["purl"] == "pkg:npm/uplot@1.6.32"
 
 
 @pytest.mark.parametrize(
