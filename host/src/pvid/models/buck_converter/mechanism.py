@@ -3,10 +3,10 @@
 from pvid.model import Model
 
 model = Model("buck converter")
-d = model.input("d", "", hold="zoh", reach=1)
-vin = model.sensor("vin", "V", resolution=20 / 2**12, reach=20, driven=True)
+d = model.input("d", "", hold="zoh", reach=1, gain_sd=1e-3)  # a timer; both voltages have dividers of 0.1 %
+vin = model.sensor("vin", "V", resolution=20 / 2**12, reach=20, driven=True, gain_sd=1e-3)
 i = model.sensor("i", "A", resolution=20 / 2**12, reach=10)
-v = model.sensor("v", "V", resolution=10 / 2**12, reach=10)
+v = model.sensor("v", "V", resolution=10 / 2**12, reach=10, gain_sd=1e-3)
 vc = model.unmeasured("vc", "V")
 L, C = model.unknown("L", "H", 2e-5), model.unknown("C", "F", 1e-4)
 RL = model.unknown("RL", "ohm", 0.05)  # coil and switches

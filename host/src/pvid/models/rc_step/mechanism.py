@@ -3,8 +3,8 @@
 from pvid.model import Model
 
 model = Model("RC step")
-u = model.input("u", "V", hold="zoh", reach=5)
-v = model.sensor("v", "V", resolution=5 / 2**12, reach=5)
+u = model.input("u", "V", hold="zoh", reach=5, gain_sd=1e-3)  # the pin has the converter's reference
+v = model.sensor("v", "V", resolution=5 / 2**12, reach=5, gain_sd=1e-3)
 R = model.known("R", "ohm", 1e4, sd=100.0, required=True)
 C, G = model.unknown("C", "F", 1e-6), model.unknown("G", "1/ohm", 1e-6)  # G: of the leak and the voltmeter
 v0 = model.unknown("v0", "V", 0.0, positive=False, sd=0.05)  # offset of the sensor
