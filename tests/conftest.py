@@ -36,7 +36,8 @@ SLOW = """
     identification/additions deploy/deploy twin/weak_f32 codegen/build log/liar cli/demo_run identification/judge
     tools/pages core/trust_q31 cli/api identification/scale_errors board/targets identification/own_mechanisms
     identification/refined twin/second_stage show/view board/refined_board tools/wheel
-    board/strong_image cli/several board/mechanism_board board/field core/read_while_stepping cli/foreign_files
+    board/strong_image codegen/robot_core board/robot_board cli/several board/mechanism_board board/field
+    core/read_while_stepping cli/foreign_files
     identification/several_recordings fleet/batch board/refined_stream codegen/generated_q31 bench/mechanisms
     cli/readme log/verify log/witness oracle/weak_in_c board/weak_boards core/weak_rows_q31 core/arithmetic_options
     codegen/weak_c core/recorded_hashes oracle/feedback codegen/generated_f32 oracle/weak_identify

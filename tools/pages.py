@@ -65,6 +65,7 @@ SHORT = (
 SHOWN = (
     ("batch.md", r"changed: ", "what it prints; tests/fleet/test_changes.py"),
     ("theory.md", "", "equations; tests/oracle"),
+    ("robots.md", r" +instructions a tick", "figures; tests/board/test_robot_board.py"),
     ("compiler.md", r"sum_j", "an equation"),
     ("compiler.md", r"cart\.py|I1, h1", "sentences; tests/model"),
     ("compiler.md", r"model\.mechanics", "a form to fill in; tests/model/test_mechanics.py"),

@@ -190,7 +190,6 @@ def test_torques_in_the_wrong_columns_are_doubted(tmp_path: Path) -> None:
 
 
 OTHERS = {
-    "build": "model build robot.py -o built",
     "predict": "model predict robot.py",
     "simulate": "model simulate robot.py run.csv",
     "deploy": "deploy robot.py --run log.csv -o made --for arduino",

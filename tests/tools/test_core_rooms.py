@@ -10,8 +10,8 @@ import pytest
 from pvid.core.sources import INCLUDES, SRC, core_sources
 
 # Each room may use itself and those before it; the forms do not use each other.
-ROOMS = ("number", "solve", "judge", "strong", "weak", "refine", "excite", "persist")
-FORMS = ("strong", "weak", "refine")
+ROOMS = ("number", "solve", "judge", "strong", "weak", "robot", "refine", "excite", "persist")
+FORMS = ("strong", "weak", "robot", "refine")
 STRANGERS = {(a, b) for a in FORMS for b in FORMS if a != b}
 
 Graph = dict[str, set[str]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -71,8 +72,36 @@ def header(design: StrongDesign | StrongDesignQ31) -> str:
         name, window, samples = design.strong_q31.name, design.strong_q31.config.window, design.counts
         core, sample, count = "q31", "int32_t", "int32_t"
         includes, own, hashed = ['#include "pvid/fnv_q31.h"'], ["#define REPLAY_FAULTS 0u"], "pvid_fnv_estimator_q31"
+    names = [
+        f"#define REPLAY_TYPE {name}_{core}",
+        f"#define REPLAY_INIT {name}_init_{core}",
+        f"#define REPLAY_STEP {name}_step_{core}",
+        f"#define REPLAY_HASH {hashed}",
+        f"#define replay_config {name}_config",
+        *own,
+    ]
+    includes = [*includes, f'#include "{name}_design_{core}.h"']
+    return replay_header(name, samples, (sample, count), includes, names, measured_from(len(samples), window))
+
+
+def replay_header(
+    form: str,
+    samples: npt.NDArray[Any],
+    kinds: tuple[str, str],
+    includes: Sequence[str],
+    names: Sequence[str],
+    measure_from: int,
+) -> str:
+    """replay_run.h of samples [ticks, signals]: the bits of floats, or counts.
+
+    Parameters
+    ----------
+    kinds : of a sample, and of what is stored of it
+    names : macros for the identifier's type and functions
+    """
     ticks, signals = samples.shape
-    suffix = "u" if core == "f32" else ""
+    sample, count = kinds
+    suffix = "u" if sample == "float" else ""
     rows = ["    {" + ", ".join(f"{word}{suffix}" for word in row) + "}," for row in samples.tolist()]
     return "\n".join(
         [
@@ -83,22 +112,16 @@ def header(design: StrongDesign | StrongDesignQ31) -> str:
             "#include <stddef.h>",
             "",
             *includes,
-            f'#include "{name}_design_{core}.h"',
             "",
-            f"#define REPLAY_TYPE {name}_{core}",
-            f"#define REPLAY_INIT {name}_init_{core}",
-            f"#define REPLAY_STEP {name}_step_{core}",
-            f"#define REPLAY_HASH {hashed}",
+            *names,
             f"#define REPLAY_SAMPLE {sample}",
             f"#define REPLAY_COUNT {count}",
-            *own,
             f"#define REPLAY_CHANNELS {signals}u",
-            f"#define REPLAY_IS_FLOAT {int(core == 'f32')}",
-            f'#define REPLAY_FORM "{name}"',
+            f"#define REPLAY_IS_FLOAT {int(sample == 'float')}",
+            f'#define REPLAY_FORM "{form}"',
             f"#define REPLAY_TICKS {ticks}u",
-            f"#define REPLAY_MEASURE_FROM {measured_from(ticks, window)}u",
+            f"#define REPLAY_MEASURE_FROM {measure_from}u",
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
-            f"#define replay_config {name}_config",
             "",
             f"static const {sample} replay_lsb[REPLAY_CHANNELS] = {{{', '.join(['1'] * signals)}}};",
             "/* [tick][signal], of floats the bits */",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,8 @@ from pvid.cli.rig_design import analysis_of, model_of_rig, recorded
 from pvid.cli.simulate import ABOVE_0, numbers, of_model, start_option
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
+    from pvid.codegen.files_robot import RobotFiles
+    from pvid.codegen.generated import GeneratedModel
     from pvid.codegen.strong_q31 import StrongQ31
     from pvid.codegen.weak_q31 import WeakQ31
     from pvid.model.compiled import CompiledModel
@@ -85,7 +88,9 @@ def check(model: str) -> int:
 
     compiled = compiled_of(asked_for(model))
     if compiled.chain is not None:
-        click.echo(robot_report(compiled))
+        from pvid.codegen.files_robot import board_report
+
+        click.echo(f"{robot_report(compiled)}\n\n{board_report(compiled)}")
         return DONE
     Parameters(compiled).checked(None)  # raises where the constraints contradict each other
     if (refusal := too_many_unknowns(compiled.name, len(compiled.unknowns))) is not None:
@@ -214,19 +219,26 @@ def build(
     shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point. NAME_refine_design_f32.h has the
     settings of the second stage, which fits the full equations (host/docs/firmware.md). With --strong,
     NAME_strong_design_f32.h has the differentiators and settings of the strong form, NAME_strong_q31.h and
-    NAME_strong_design_q31.h have it in fixed point.
+    NAME_strong_design_q31.h have it in fixed point. Of a robot there is NAME_robot.h for pvid/robot.h in float32, and
+    with --run NAME_design_f32.h (host/docs/robots.md).
     """
-    from pvid.codegen import build as generated
     from pvid.codegen.fixed_model import Reaches
     from pvid.codegen.generated import GeneratedModel, Options
     from pvid.codegen.weak_sizes import refuse_too_many_unknowns
     from pvid.oracle.weak.edges import with_edges
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
-    refuse_too_many_unknowns(compiled)
+    if compiled.chain is None:
+        refuse_too_many_unknowns(compiled)
     if columns is not None and run_path is None:
         raise PvidError("--columns needs --run")
     recording = None if run_path is None else recorded(compiled, rig, run_path, columns)
+    if compiled.chain is not None:
+        asked = {"--strong": strong, "--soft-sign": soft_signs, "--reach": reaches, "--functions": functions}
+        if given := [name for name, one in asked.items() if one]:
+            raise PvidError(f"{given[0]} is not for a robot, whose C has one form alone")
+        named = [("--rig", rig_path), ("--run", run_path)]
+        return _build_robot(compiled, recording, out, only_check, [f" {o} {p.name}" for o, p in named if p is not None])
     found: Identified | None = None
     if recording is not None:
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
@@ -257,21 +269,47 @@ def build(
         refine_design, no_refinement = _refine_design_of(compiled, recording, design, soft)
         options = replace(options, refine_design=refine_design)
     whole = replace(whole, options=options)
+    refusals = {
+        "fixed point": whole.fixed.refusal,
+        "weak form in C": whole.weak.refusal,
+        "weak form in fixed point": no_fixed_weak,
+        "strong form in fixed point": no_fixed_strong,
+        "refinement in C": no_refinement,
+    }
+    if whole.weak.refusal is None and design is None:
+        refusals["design of a rig"] = _NO_RUN
+    return _written(whole, out, only_check, refusals)
+
+
+_NO_RUN = "give a recording of it with --run"
+
+
+def _build_robot(
+    compiled: CompiledModel, recording: Recording | None, out: Path, only_check: bool, given: Sequence[str]
+) -> int:
+    """Writes or checks the files of a robot."""
+    from pvid.codegen.files_robot import RobotFiles, refuse_large
+    from pvid.configuration.robot_core import robot_core_design
+
+    refuse_large(compiled)
+    design = None if recording is None else robot_core_design(compiled, recording)
+    files = RobotFiles(compiled, "".join(["pvid model build ", compiled.name, *given]), design)
+    refusals = {"fixed point": "a robot is identified in float32 alone"}
+    return _written(files, out, only_check, refusals | ({} if design else {"design of a rig": _NO_RUN}))
+
+
+def _written(
+    whole: GeneratedModel | RobotFiles, out: Path, only_check: bool, refusals: Mapping[str, str | None]
+) -> int:
+    """Writes the files and says what is not among them, or compares them with what is there."""
+    from pvid.codegen import build as generated
+
     if not only_check:
         for path in generated.build(whole, out):
             click.echo(path)
-        refusals = {
-            "fixed point": whole.fixed.refusal,
-            "weak form in C": whole.weak.refusal,
-            "weak form in fixed point": no_fixed_weak,
-            "strong form in fixed point": no_fixed_strong,
-            "refinement in C": no_refinement,
-        }
         for what, reason in refusals.items():
             if reason is not None:
                 write_stderr(f"pvid: no {what}: {reason}")
-        if whole.weak.refusal is None and design is None:
-            write_stderr("pvid: no design of a rig: give a recording of it with --run")
         return DONE
     try:
         generated.check(whole, out)

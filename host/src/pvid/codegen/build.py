@@ -18,6 +18,7 @@ from pvid.codegen import (
     self_test,
     twin_file,
 )
+from pvid.codegen.files_robot import RobotFiles
 from pvid.codegen.generated import GeneratedModel
 
 # Each takes the generated model and returns name -> text of its files, none where the model or the order has no such
@@ -39,23 +40,25 @@ PRINTERS = (
 )
 
 
-def files_of(model: GeneratedModel) -> dict[str, str]:
+def files_of(model: GeneratedModel | RobotFiles) -> dict[str, str]:
     """Name -> text of each file.
 
     Raises PvidError where a function cannot be generated; for a soft sign that is in no channel, a reach that is of no
     input.
     """
+    if isinstance(model, RobotFiles):
+        return model.files()
     return {name: text for printed in PRINTERS for name, text in printed(model).items()}
 
 
-def build(model: GeneratedModel, directory: Path) -> list[Path]:
+def build(model: GeneratedModel | RobotFiles, directory: Path) -> list[Path]:
     """Writes the files of a model into a folder, which is made if there is none; their paths. Raises as `files_of`."""
     files = files_of(model)
     directory.mkdir(parents=True, exist_ok=True)
     return write_files(directory, files)
 
 
-def check(model: GeneratedModel, directory: Path) -> None:
+def check(model: GeneratedModel | RobotFiles, directory: Path) -> None:
     """Whether the files in a folder are those of the model.
 
     Raises PvidError for the first file that is missing or differs.

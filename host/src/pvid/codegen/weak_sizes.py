@@ -48,7 +48,7 @@ def too_many_unknowns(name: str, unknowns: int) -> str | None:
 def refuse_too_many_unknowns(model: CompiledModel) -> None:
     """PvidError for a model with more unknowns than the C core takes, and for a robot; at once, before its rows are
     looked at."""
-    model.refuse_robot(f"the C core, of at most {most_sizes()['PVID_MAX_P']} unknowns,")
+    model.refuse_robot("the weak form in C")
     if (refusal := too_many_unknowns(model.name, len(model.unknowns))) is not None:
         raise PvidError(refusal)
 

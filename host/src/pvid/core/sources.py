@@ -20,7 +20,7 @@ FOLDERS = (*PUBLIC_FOLDERS, SRC)
 PUBLIC_INCLUDES = [f"-I{folder}" for folder in PUBLIC_FOLDERS]
 INCLUDES = [f"-I{folder}" for folder in FOLDERS]
 _CORES = ("_f32", "_q31")
-_FORMS = ("strong", "weak", "refine", "excite")  # rooms that not every image links
+_FORMS = ("strong", "weak", "robot", "refine", "excite")  # rooms that not every image links
 
 
 def build_folder() -> Path:

@@ -346,7 +346,10 @@ class CompiledModel:
     def refuse_robot(self, what: str = "this command") -> None:
         """PvidError by what takes no robot."""
         if self.chain is not None:
-            raise PvidError(f"{self.name} is a robot, which {what} does not take: `pvid identify` in float64 does")
+            raise PvidError(
+                f"{self.name} is a robot, which {what} does not take: `pvid identify` in float64 does, and `pvid model "
+                "build` prints its C"
+            )
 
     @property
     def p(self) -> tuple[sp.Symbol, ...]:

@@ -1,4 +1,4 @@
-"""The weak form in float32 and in fixed point, and the strong form of any model: what differs by name alone."""
+"""The weak form in float32 and in fixed point, the strong form of any model, and robots: what differs by name alone."""
 
 from __future__ import annotations
 
@@ -32,5 +32,6 @@ FLOAT = CoreBuild("f32", "float32", "replay_weak", ("_q31",))
 FIXED = CoreBuild("q31", "fixed point", "replay_weak_q31", ("_f32",))
 STRONG = CoreBuild("f32", "float32", None, ("_q31", "_weak_f32", "_refine_f32"), "strong")
 STRONG_FIXED = CoreBuild("q31", "fixed point", None, ("_f32", "_weak_q31"), "strong")
+ROBOT = CoreBuild("f32", "float32", None, ("_q31", "_weak_f32", "_refine_f32"), "robot")
 STRONG_CORES: Mapping[str, CoreBuild] = {one.name: one for one in (STRONG, STRONG_FIXED)}
 CORES: Mapping[str, CoreBuild] = {one.name: one for one in (FLOAT, FIXED)}

@@ -30,7 +30,7 @@ from pvid.oracle.weak.front import filtered, of_hold, samples_of, segments_of
 from pvid.oracle.weak.functions import Float, TestFunctions
 from pvid.oracle.weak.solve import inverse, solved
 
-_DEGREE, _SHORTEST, _LONGEST = 4, 7, 61  # of the polynomials that give positions and rates
+POLYNOMIAL, _SHORTEST, _LONGEST = 4, 7, 61  # degree and taps of what gives positions and rates
 _BLURRED = 1.2  # of the noise of a rate: what a longer polynomial may change
 _SHORTEST_S, _LONGEST_S, _WINDOWS = 0.5, 1.0, 15  # of a window, and how many the run has of them end to end
 _POWER, _FEWEST, _MOST = 4, 21, 49  # of the test functions
@@ -113,21 +113,22 @@ class RobotRun:
             raise PvidError(f"the run has no {2 * _LONGEST} samples without a gap: record longer")
         whole = max(parts, key=lambda one: one.shape[1])
         inner = slice(_LONGEST, -_LONGEST)
-        short = polynomial_weights(_SHORTEST, _DEGREE, 0)
+        short = polynomial_weights(_SHORTEST, POLYNOMIAL, 0)
         left = whole - self.smoothed(whole, _SHORTEST, 0)
         sd = np.sqrt(np.mean(left[:, inner] ** 2, axis=1) / (1 - short[_SHORTEST // 2]))
         rates, taps = self.smoothed(whole, _SHORTEST, 1)[:, inner], _SHORTEST
         for longer in range(_SHORTEST + 2, _LONGEST + 1, 2):
             apart = self.smoothed(whole, longer, 1)[:, inner] - rates
-            weights = polynomial_weights(longer, _DEGREE, 1).copy()
-            weights[(longer - _SHORTEST) // 2 : (longer + _SHORTEST) // 2] -= polynomial_weights(_SHORTEST, _DEGREE, 1)
+            weights = polynomial_weights(longer, POLYNOMIAL, 1).copy()
+            inner_taps = slice((longer - _SHORTEST) // 2, (longer + _SHORTEST) // 2)
+            weights[inner_taps] -= polynomial_weights(_SHORTEST, POLYNOMIAL, 1)
             if np.any(np.mean(apart**2, axis=1) > _BLURRED * (sd * rate) ** 2 * np.sum(weights**2)):
                 break
             taps = longer
         smooth = self.smoothed(whole, taps, 1)[:, inner]
         still = np.mean(np.diff(whole, axis=1) == 0, axis=1)
         power = np.abs(np.fft.rfft(smooth - smooth.mean(axis=1, keepdims=True))) ** 2
-        gain = np.abs(np.fft.rfft(polynomial_weights(taps, _DEGREE, 1) * rate, smooth.shape[1])) ** 2
+        gain = np.abs(np.fft.rfft(polynomial_weights(taps, POLYNOMIAL, 1) * rate, smooth.shape[1])) ** 2
         noise = np.outer(sd**2 * smooth.shape[1], gain)
         power = np.sum(np.where(power > _CLEAR * noise, power, 0.0), axis=0)
         below = int(np.searchsorted(np.cumsum(power), _MOTION * power.sum()))
@@ -142,7 +143,7 @@ class RobotRun:
 
     def smoothed(self, q: Float, taps: int, order: int) -> Float:
         """Positions or rates [n, samples]; wrong within half of the ends."""
-        weights = polynomial_weights(taps, _DEGREE, order) * self.sample_rate**order
+        weights = polynomial_weights(taps, POLYNOMIAL, order) * self.sample_rate**order
         return np.array([filtered(one, weights) for one in q])
 
     def values(self, columns: Sequence[int], size: int, seed: int | None = None, sign: int = 1) -> Iterator[Segment]:
@@ -246,7 +247,7 @@ class RobotRows:
                 f"cut the log to {int(most / run.sample_rate)} s"
             )
         tables = [functions.combine(0), -functions.combine(1)]
-        weights = polynomial_weights(run.design.taps, _DEGREE, 1) * run.sample_rate
+        weights = polynomial_weights(run.design.taps, POLYNOMIAL, 1) * run.sample_rate
         noise = run.design.sd * float(np.linalg.norm(weights))
         parts, known, others, doubts, follows = [], [], [], [], []
         for segment in run.values(columns, max(_STEPS // hop, 1) * hop, seed, sign):
@@ -360,7 +361,7 @@ class RobotFit:
         """Torques of each segment of a run, measured and as each of several p [.., p] gives them: [n, steps] and
         [n, .., steps]."""
         n, taps = len(run.chain.joints), 2 * self.design.taps + 1
-        weights = polynomial_weights(taps, _DEGREE, 1) * run.sample_rate
+        weights = polynomial_weights(taps, POLYNOMIAL, 1) * run.sample_rate
         for segment in run.values(self.columns, _STEPS):
             if segment.position.shape[1] < taps:
                 continue

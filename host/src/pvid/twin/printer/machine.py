@@ -62,12 +62,16 @@ class Place:
         setattr(self._owner, self._name, value)
 
 
-def share(to: Any, of: Any, size: int) -> None:
-    """A copy word by word: of a struct, or of `size` bytes of an array of words; 0: of nothing."""
+def share(*given: Any) -> None:
+    """A copy word by word, to `to` from `of`: of a struct, or of `size` bytes of an array of words; 0: of nothing.
+
+    Arguments are to, of and size, or to, to_at, of, of_at and size where the arrays are parts of larger ones.
+    """
+    (to, to_at, of, of_at, size) = given if len(given) == 5 else (given[0], 0, given[1], 0, given[2])
     if size == WHOLE:
         to.assign(of)
     elif size > 0:
-        to[: size // 4] = of[: size // 4]
+        to[to_at : to_at + size // 4] = of[of_at : of_at + size // 4]
 
 
 def clear(one: Any) -> None:

@@ -1,0 +1,682 @@
+#include "number/uncontracted.h"
+
+#include "pvid/robot.h"
+
+#include <math.h>
+
+#include "judge/publication.h"
+#include "number/count.h"
+#include "number/finite_f32.h"
+#include "number/init.h"
+#include "number/unroll.h"
+#include "pvid/elementary.h"
+#include "pvid/fnv_word.h"
+
+#define SPLINES PVID_ROBOT_SPLINES
+#define PAST 3u          /* white rows that the next one needs */
+#define ROW_LIMIT 1.0e9f /* of an entry of a row */
+#define PIVOT 1.0e-6f    /* of the diagonal */
+#define LEAST_Q 1.0e-30f /* of Q_i */
+#define MOST_TAPS 1024u
+#define MOST_ROWS 1048576u
+#define MOST_TICKS 65535u /* of an interval */
+
+enum { IDLE, FORGET, ASSEMBLE, FACTOR, BACKWARD, CORRECT, ERRORS, PUBLISH };
+
+/* Entries of a packed triangle of n rows: row i begins at triangle(i). */
+static inline uint32_t triangle(uint32_t n)
+{
+    return (n * (n + 1u)) / 2u;
+}
+
+static inline uint16_t first_of(const pvid_robot_model_f32 *model, uint8_t joint)
+{
+    return (joint == 0u) ? 0u : model->end[joint - 1u];
+}
+
+/* Entries of S of the joints before this one. */
+static uint32_t before(const pvid_robot_model_f32 *model, uint8_t joint)
+{
+    uint32_t sum = 0;
+    for (uint8_t j = 0; j < joint; j++) {
+        sum += triangle((uint32_t)model->end[j] - first_of(model, j));
+    }
+    return sum;
+}
+
+static uint32_t places(const pvid_robot_model_f32 *model, const pvid_robot_design_f32 *design, pvid_robot_f32 *self)
+{
+    const uint32_t n = model->joints;
+    const uint32_t p = model->p;
+    const uint32_t slots = model->end[n - 1u];
+    self->slots = (uint16_t)slots;
+    self->at.ring = 0;
+    self->at.values = 4u * n * design->taps;
+    self->at.inputs = self->at.values + model->entries;
+    self->at.sums = self->at.inputs + (3u * n);
+    self->at.white = self->at.sums + (SPLINES * (slots + n));
+    self->at.s = self->at.white + (PAST * (slots + n));
+    self->at.f = self->at.s + before(model, model->joints);
+    self->at.m = self->at.f + slots;
+    self->at.z = self->at.m + triangle(p);
+    self->at.delta = self->at.z + p;
+    self->at.p = self->at.delta + p;
+    self->at.next = self->at.p + p;
+    self->at.fresh = self->at.next + p;
+    self->at.shared = self->at.fresh + (2u * p);
+    self->at.copy = self->at.shared + (2u * p);
+    self->at.end = self->at.copy + (2u * p);
+    return self->at.end;
+}
+
+PVID_COLD uint32_t pvid_robot_memory_f32(const pvid_robot_model_f32 *model, const pvid_robot_design_f32 *design)
+{
+    pvid_robot_f32 none;
+    return places(model, design, &none);
+}
+
+static bool are_finite(const float x[], uint32_t n)
+{
+    bool finite = x != NULL;
+    for (uint32_t i = 0; finite && (i < n); i++) {
+        finite = pvid_finite_f32(x[i]);
+    }
+    return finite;
+}
+
+static bool model_is_valid(const pvid_robot_model_f32 *model)
+{
+    if ((model->joints < 1u) || (model->joints > PVID_ROBOT_JOINTS) || (model->p < 1u) || (model->p > PVID_ROBOT_P) ||
+        (model->entries < 1u) || (model->forces > model->entries) || (model->end == NULL) || (model->column == NULL) ||
+        (model->slot == NULL) || (model->held == NULL) || (model->values == NULL) ||
+        !are_finite(model->gain, model->joints)) {
+        return false;
+    }
+    bool valid = true;
+    for (uint8_t j = 0; j < model->joints; j++) {
+        const uint16_t first = first_of(model, j);
+        valid = valid && (model->end[j] >= first) && ((uint32_t)model->end[j] <= ((uint32_t)first + model->p));
+        for (uint16_t i = first; valid && (i < model->end[j]); i++) {
+            valid = (model->column[i] < model->p) && ((i == first) || (model->column[i] > model->column[i - 1u]));
+        }
+    }
+    for (uint16_t i = 0; valid && (i < model->entries); i++) {
+        valid = model->slot[i] < model->end[model->joints - 1u];
+    }
+    return valid;
+}
+
+static bool design_is_valid(const pvid_robot_design_f32 *design)
+{
+    const uint32_t ticks = (uint32_t)design->interval * design->decimation;
+    return (design->taps >= 3u) && ((design->taps % 2u) == 1u) && (design->taps <= MOST_TAPS) &&
+           (design->interval >= 3u) && (ticks >= 3u) && (ticks <= MOST_TICKS) &&
+           are_finite(design->position, design->taps / 2u) && are_finite(design->rate, design->taps / 2u) &&
+           are_finite(design->spline, SPLINES * design->interval) &&
+           are_finite(design->slope, SPLINES * design->interval) && are_finite(design->torque, 2u * SPLINES * ticks) &&
+           are_finite(design->white, SPLINES);
+}
+
+/* Ticks of an interval that add the row of a joint or do a stage of an estimate: none of those that compute values or
+ * add them, where a step has others. */
+static uint32_t free_ticks(const pvid_robot_design_f32 *design)
+{
+    return (uint32_t)design->interval * ((design->decimation > 2u) ? (design->decimation - 2u) : 1u);
+}
+
+static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *config, float memory[], uint32_t room)
+{
+    const pvid_robot_model_f32 *model = config->model;
+    const pvid_robot_design_f32 *design = config->design;
+    if ((model == NULL) || (design == NULL) || (memory == NULL)) {
+        return PVID_BAD_POINTER;
+    }
+    if (!model_is_valid(model)) {
+        return PVID_BAD_MODEL;
+    }
+    if (!design_is_valid(design)) {
+        return PVID_BAD_DESIGN;
+    }
+    const uint32_t left = free_ticks(design);
+    const uint32_t stages = (3u * (uint32_t)model->joints) + (2u * (uint32_t)model->p) + 3u;
+    if ((left <= (model->joints + 1u)) || ((config->group * (left - model->joints - 1u)) < stages)) {
+        return PVID_BAD_WINDOW;
+    }
+    if (!are_finite(config->start, model->p)) {
+        return PVID_BAD_START;
+    }
+    bool positive = config->start_sd != NULL;
+    for (uint8_t k = 0; positive && (k < model->p); k++) {
+        positive = pvid_within_f32(config->start_sd[k], 1.0e-9f, 1.0e9f);
+    }
+    if (!positive) {
+        return PVID_BAD_START_SD;
+    }
+    if ((config->memory < (2u * (uint32_t)model->p)) || (config->memory > MOST_ROWS)) {
+        return PVID_BAD_FORGETTING;
+    }
+    memset(self, 0, sizeof *self);
+    if (places(model, design, self) > room) {
+        return PVID_BAD_LAYOUT;
+    }
+    self->config = *config;
+    self->memory = memory;
+    memset(memory, 0, self->at.end * sizeof memory[0]);
+    for (uint32_t k = 0; k < model->p; k++) {
+        memory[self->at.p + k] = config->start[k];
+        memory[self->at.fresh + k] = config->start[k];
+        memory[self->at.fresh + model->p + k] = config->start_sd[k];
+    }
+    memcpy(&memory[self->at.shared], &memory[self->at.fresh], 2u * (size_t)model->p * sizeof memory[0]);
+    memcpy(&memory[self->at.copy], &memory[self->at.fresh], 2u * (size_t)model->p * sizeof memory[0]);
+    pvid_robot_gap_f32(self);
+    return PVID_OK;
+}
+
+PVID_COLD pvid_status pvid_robot_init_f32(pvid_robot_f32 *self, const pvid_robot_config_f32 *config, float memory[],
+                                          uint32_t room)
+{
+    const pvid_status status =
+        pvid_init_is_given(self, config) ? prepare(self, config, memory, room) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
+}
+
+PVID_COLD void pvid_robot_gap_f32(pvid_robot_f32 *self)
+{
+    if ((self == NULL) || (self->memory == NULL)) {
+        return;
+    }
+    const uint32_t width = (uint32_t)self->slots + self->config.model->joints;
+    memset(&self->memory[self->at.sums], 0, (SPLINES + PAST) * (size_t)width * sizeof self->memory[0]);
+    self->filled = 0;
+    self->place = 0;
+    self->tick = 0;
+    self->young = PAST;
+    self->row = self->config.model->joints;
+    self->begun = false;
+}
+
+/* ---- samples and steps ---- */
+
+/* The weight of each of the four splines, the youngest of which is `youngest`, from a table[4][length] by age. */
+static void weights_of(uint32_t youngest, const float table[], uint32_t length, float weight[])
+{
+    PVID_UNROLL
+    for (uint32_t age = 0; age < SPLINES; age++) {
+        weight[((youngest + SPLINES) - age) % SPLINES] = table[age * length];
+    }
+}
+
+/* The last samples of a signal, oldest first: each stands in its ring twice. */
+static inline const float *window_of(const pvid_robot_f32 *self, uint32_t signal)
+{
+    return &self->memory[self->at.ring + (2u * signal * self->config.design->taps) + self->place];
+}
+
+/* Adds the torques at the centre of the window to the four splines. */
+static void add_torques(pvid_robot_f32 *self)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    const pvid_robot_design_f32 *design = self->config.design;
+    const uint32_t ticks = (uint32_t)design->interval * design->decimation;
+    float of_sample[SPLINES] = {0.0f, 0.0f, 0.0f, 0.0f};
+    float of_hold[SPLINES] = {0.0f, 0.0f, 0.0f, 0.0f};
+    weights_of(self->spline, &design->torque[self->tick], ticks, of_sample);
+    weights_of(self->spline, &design->torque[(SPLINES * ticks) + self->tick], ticks, of_hold);
+    float *sums = &self->memory[self->at.sums + (SPLINES * (uint32_t)self->slots)];
+    for (uint32_t j = 0; j < model->joints; j++) {
+        const float torque = model->gain[j] * window_of(self, model->joints + j)[design->taps / 2u];
+        const float *own = model->held[j] ? of_hold : of_sample;
+        PVID_UNROLL
+        for (uint32_t k = 0; k < SPLINES; k++) {
+            sums[(SPLINES * j) + k] += own[k] * torque;
+        }
+    }
+}
+
+/* q, v and the mean of sgn(v) over a step, and from them the values. */
+static void take_step(pvid_robot_f32 *self)
+{
+    const pvid_robot_design_f32 *design = self->config.design;
+    const uint32_t n = self->config.model->joints;
+    const uint32_t half = design->taps / 2u;
+    float *in = &self->memory[self->at.inputs];
+    for (uint32_t j = 0; j < n; j++) {
+        const float *x = window_of(self, j);
+        const float centre = x[half];
+        float q = 0.0f; /* relative to it: float32 keeps its resolution */
+        float v = 0.0f;
+        PVID_UNROLL_BY_FOUR
+        for (uint32_t i = 1; i <= half; i++) {
+            const float later = x[half + i] - centre;
+            const float earlier = x[half - i] - centre;
+            q += design->position[i - 1u] * (later + earlier);
+            v += design->rate[i - 1u] * (later - earlier);
+        }
+        const float jump = self->begun ? (0.5f * pvid_magnitude_f32(v - in[n + j])) : 0.0f;
+        in[j] = centre + q;
+        in[n + j] = v;
+        in[(2u * n) + j] = (pvid_magnitude_f32(v) >= jump) ? pvid_sign_f32(v) : (v / jump);
+    }
+    self->begun = true;
+    self->config.model->values(in, &self->memory[self->at.values]);
+}
+
+/* sums[slot][4] += weight[4] value, of each value. */
+static void add_to_slots(float sums[], const uint16_t slot[], const float value[], uint32_t values,
+                         const float weight[])
+{
+    const float w0 = weight[0];
+    const float w1 = weight[1];
+    const float w2 = weight[2];
+    const float w3 = weight[3];
+    for (uint32_t i = 0; i < values; i++) {
+        float *sum = &sums[SPLINES * (uint32_t)slot[i]];
+        const float x = value[i];
+        sum[0] += w0 * x;
+        sum[1] += w1 * x;
+        sum[2] += w2 * x;
+        sum[3] += w3 * x;
+    }
+}
+
+/* Adds the values of a step to the four splines. */
+static void add_values(pvid_robot_f32 *self)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    const pvid_robot_design_f32 *design = self->config.design;
+    const uint32_t step = self->tick / design->decimation;
+    const float *values = &self->memory[self->at.values];
+    float *sums = &self->memory[self->at.sums];
+    float weight[SPLINES] = {0.0f, 0.0f, 0.0f, 0.0f};
+    weights_of(self->spline, &design->spline[step], design->interval, weight);
+    add_to_slots(sums, model->slot, values, model->forces, weight);
+    weights_of(self->spline, &design->slope[step], design->interval, weight);
+    add_to_slots(sums, &model->slot[model->forces], &values[model->forces], (uint32_t)model->entries - model->forces,
+                 weight);
+}
+
+/* The oldest spline is complete: its rows become white, and its sums those of the next one. */
+static void end_interval(pvid_robot_f32 *self)
+{
+    const float *w = self->config.design->white;
+    const uint32_t width = (uint32_t)self->slots + self->config.model->joints;
+    const uint8_t oldest = (uint8_t)((self->spline + 1u) % SPLINES);
+    float *sums = &self->memory[self->at.sums + oldest];
+    self->spline = oldest;
+    if (self->young > 0u) {
+        self->young--;
+        for (uint32_t i = 0; i < width; i++) {
+            sums[SPLINES * i] = 0.0f;
+        }
+        return;
+    }
+    const uint8_t third = (uint8_t)((self->latest + 1u) % PAST);
+    const uint8_t second = (uint8_t)((self->latest + 2u) % PAST);
+    const float *last = &self->memory[self->at.white + (self->latest * width)];
+    const float *middle = &self->memory[self->at.white + (second * width)];
+    float *fresh = &self->memory[self->at.white + (third * width)];
+    for (uint32_t i = 0; i < width; i++) {
+        fresh[i] = ((w[0] * sums[SPLINES * i]) + (w[1] * last[i])) + ((w[2] * middle[i]) + (w[3] * fresh[i]));
+        sums[SPLINES * i] = 0.0f;
+    }
+    self->latest = third;
+    self->row = 0;
+}
+
+/* ---- rows ---- */
+
+static pvid_reason add_row(pvid_robot_f32 *self)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    const uint8_t joint = self->row;
+    const uint16_t first = first_of(model, joint);
+    const uint32_t n = (uint32_t)model->end[joint] - first;
+    const float *u = &self->memory[self->at.white + (self->latest * ((uint32_t)self->slots + model->joints)) + first];
+    const float *p = &self->memory[(joint < self->corrected) ? self->at.next : self->at.p];
+    float *s = &self->memory[self->at.s + before(model, joint)];
+    float *f = &self->memory[self->at.f + first];
+    const float y = u[((uint32_t)self->slots + joint) - first];
+    self->row++;
+    if (joint == 0u) {
+        self->rows++;
+        self->since++;
+    }
+    float e = y;
+    bool fits = pvid_magnitude_f32(y) <= ROW_LIMIT; /* NaN fails the comparison */
+    for (uint32_t i = 0; i < n; i++) {
+        e -= u[i] * p[model->column[first + i]];
+        fits = fits && (pvid_magnitude_f32(u[i]) <= ROW_LIMIT);
+    }
+    if (!fits || !(pvid_magnitude_f32(e) <= ROW_LIMIT)) {
+        pvid_count_up(&self->saturated);
+        return PVID_REJECTED_SATURATED;
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        const float x = u[i];
+        PVID_UNROLL_BY_FOUR
+        for (uint32_t j = 0; j <= i; j++) {
+            s[j] += x * u[j];
+        }
+        s = &s[i + 1u];
+        f[i] += x * e;
+    }
+    self->q[joint] += e * e;
+    return PVID_ACCUMULATED;
+}
+
+/* ---- the estimate, a stage a tick ---- */
+
+/* Older rows count half. */
+static void forget(pvid_robot_f32 *self, uint8_t joint)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    float *memory = self->memory;
+    const uint32_t end = before(model, (uint8_t)(joint + 1u));
+    for (uint32_t i = before(model, joint); i < end; i++) {
+        memory[self->at.s + i] *= 0.5f;
+    }
+    for (uint32_t i = first_of(model, joint); i < model->end[joint]; i++) {
+        memory[self->at.f + i] *= 0.5f;
+    }
+    self->q[joint] *= 0.5f;
+}
+
+/* M and the right side: those of the start, then joint by joint. */
+static void assemble(pvid_robot_f32 *self, uint8_t joint)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    float *memory = self->memory;
+    float *m = &memory[self->at.m];
+    if (joint == 0u) {
+        memset(m, 0, triangle(model->p) * sizeof m[0]);
+        for (uint32_t k = 0; k < model->p; k++) {
+            const float sd = self->config.start_sd[k];
+            const float weight = 1.0f / (sd * sd);
+            m[triangle(k) + k] = weight;
+            memory[self->at.z + k] = weight * (self->config.start[k] - memory[self->at.p + k]);
+        }
+    }
+    const float free = (float)self->rows - ((float)model->p / (float)model->joints);
+    const float weight = free / ((self->q[joint] > LEAST_Q) ? self->q[joint] : LEAST_Q);
+    const uint16_t first = first_of(model, joint);
+    const float *s = &memory[self->at.s + before(model, joint)];
+    for (uint32_t i = first; i < model->end[joint]; i++) {
+        float *row = &m[triangle(model->column[i])];
+        PVID_UNROLL_BY_FOUR
+        for (uint32_t j = first; j <= i; j++) {
+            row[model->column[j]] += weight * s[j - first];
+        }
+        s = &s[(i - first) + 1u];
+        memory[self->at.z + model->column[i]] += weight * memory[self->at.f + i];
+    }
+}
+
+static float product(const float x[], const float y[], uint32_t n)
+{
+    float sum = 0.0f;
+    PVID_UNROLL_BY_FOUR
+    for (uint32_t k = 0; k < n; k++) {
+        sum += x[k] * y[k];
+    }
+    return sum;
+}
+
+/* Row i of L, M = L L^T, in the place of M's, and z = L^-1 of the right side; false: a pivot is too small. */
+static bool factor_row(float m[], float z[], uint32_t i)
+{
+    float *row = &m[triangle(i)];
+    const float diagonal = row[i];
+    for (uint32_t j = 0; j < i; j++) {
+        const float *other = &m[triangle(j)];
+        row[j] = (row[j] - product(row, other, j)) / other[j];
+    }
+    const float pivot = diagonal - product(row, row, i);
+    if (!(pivot > (PIVOT * diagonal)) || !pvid_finite_f32(pivot)) {
+        return false;
+    }
+    row[i] = sqrtf(pivot);
+    z[i] = (z[i] - product(row, z, i)) / row[i];
+    return true;
+}
+
+/* x = L^-T z in the place of z[n], whose entries below `last` are needed; z is zero behind it where it is shorter. */
+static void backward(const float m[], float z[], uint32_t n)
+{
+    for (uint32_t i = n; i > 0u; i--) {
+        const float *row = &m[triangle(i - 1u)];
+        const float x = z[i - 1u] / row[i - 1u];
+        z[i - 1u] = x;
+        PVID_UNROLL_BY_FOUR
+        for (uint32_t k = 0; k < (i - 1u); k++) {
+            z[k] -= row[k] * x;
+        }
+    }
+}
+
+/* z = L^-1 e_k [n]; entries before k are not written. */
+static void unit_forward(const float m[], float z[], uint32_t k, uint32_t n)
+{
+    z[k] = 1.0f / m[triangle(k) + k];
+    for (uint32_t i = k + 1u; i < n; i++) {
+        const float *row = &m[triangle(i)];
+        z[i] = -product(&row[k], &z[k], i - k) / row[i];
+    }
+}
+
+/* F and Q of a joint at p + delta. */
+static void correct(pvid_robot_f32 *self, uint8_t joint)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    const uint16_t first = first_of(model, joint);
+    const uint32_t n = (uint32_t)model->end[joint] - first;
+    const float *s = &self->memory[self->at.s + before(model, joint)];
+    const float *delta = &self->memory[self->at.delta];
+    float *f = &self->memory[self->at.f + first];
+    float d[PVID_ROBOT_P];
+    float change = 0.0f;
+    for (uint32_t i = 0; i < n; i++) {
+        d[i] = delta[model->column[first + i]];
+        change -= d[i] * f[i];
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        float sum = s[i] * d[i];
+        PVID_UNROLL_BY_FOUR
+        for (uint32_t j = 0; j < i; j++) {
+            sum += s[j] * d[j];
+            f[j] -= s[j] * d[i];
+        }
+        f[i] -= sum;
+        s = &s[i + 1u];
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        change -= d[i] * f[i];
+    }
+    const float q = self->q[joint] + change;
+    self->q[joint] = (q > LEAST_Q) ? q : LEAST_Q;
+    self->corrected = (uint8_t)(joint + 1u);
+}
+
+/* p + delta; false: it is not finite. */
+static bool take_delta(pvid_robot_f32 *self)
+{
+    const uint32_t n = self->config.model->p;
+    float *memory = self->memory;
+    backward(&memory[self->at.m], &memory[self->at.z], n);
+    memcpy(&memory[self->at.delta], &memory[self->at.z], n * sizeof memory[0]);
+    for (uint32_t k = 0; k < n; k++) {
+        memory[self->at.next + k] = memory[self->at.p + k] + memory[self->at.delta + k];
+    }
+    return are_finite(&memory[self->at.next], n);
+}
+
+static void publish(pvid_robot_f32 *self)
+{
+    float *memory = self->memory;
+    const uint32_t n = self->config.model->p;
+    memcpy(&memory[self->at.fresh], &memory[self->at.p], n * sizeof memory[0]);
+    pvid_count_up(&self->number);
+    pvid_publication_write(&self->mark, &memory[self->at.shared], &memory[self->at.copy], &memory[self->at.fresh],
+                           2u * (size_t)n * sizeof memory[0], self->number);
+}
+
+/* One stage; the next one, or the next joint or parameter, follows. */
+static pvid_reason do_stage(pvid_robot_f32 *self)
+{
+    const uint32_t n = self->config.model->p;
+    float *memory = self->memory;
+    const uint8_t i = self->index;
+    uint32_t all = 1; /* of the stage */
+    bool solved = true;
+    pvid_reason reason = PVID_ACCUMULATED;
+    switch (self->stage) {
+    case FORGET:
+        all = self->config.model->joints;
+        forget(self, i);
+        self->rows -= ((i + 1u) == all) ? (self->rows / 2u) : 0u;
+        break;
+    case ASSEMBLE:
+        all = self->config.model->joints;
+        self->factor = false;
+        assemble(self, i);
+        break;
+    case FACTOR:
+        all = n;
+        solved = factor_row(&memory[self->at.m], &memory[self->at.z], i);
+        break;
+    case BACKWARD:
+        solved = take_delta(self);
+        break;
+    case CORRECT:
+        all = self->config.model->joints;
+        correct(self, i);
+        if ((i + 1u) == all) {
+            memcpy(&memory[self->at.p], &memory[self->at.next], n * sizeof memory[0]);
+            self->corrected = 0;
+        }
+        break;
+    case ERRORS:
+        all = n;
+        unit_forward(&memory[self->at.m], &memory[self->at.z], i, n);
+        memory[self->at.fresh + n + i] = sqrtf(product(&memory[self->at.z + i], &memory[self->at.z + i], n - i));
+        break;
+    case PUBLISH:
+        self->factor = true;
+        publish(self);
+        reason = PVID_UPDATED;
+        break;
+    default:
+        break;
+    }
+    self->index = (uint8_t)(i + 1u);
+    if (!solved) {
+        pvid_count_up(&self->singular);
+        self->stage = IDLE;
+        return PVID_HELD_SINGULAR;
+    }
+    if (self->index >= all) {
+        self->index = 0;
+        self->stage = (uint8_t)((self->stage == PUBLISH) ? IDLE : (self->stage + 1u));
+    }
+    return reason;
+}
+
+/* What a free tick does: the row of a joint, else a stage. */
+static pvid_reason do_task(pvid_robot_f32 *self)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    if (self->row < model->joints) {
+        return add_row(self);
+    }
+    if ((self->stage == IDLE) && (self->since >= self->config.group) &&
+        ((self->rows * model->joints) >= (2u * (uint32_t)model->p))) {
+        self->since = 0;
+        self->index = 0;
+        self->stage = (self->rows >= self->config.memory) ? FORGET : ASSEMBLE;
+        return PVID_ACCUMULATED;
+    }
+    return (self->stage == IDLE) ? PVID_ACCUMULATED : do_stage(self);
+}
+
+pvid_reason pvid_robot_step_f32(pvid_robot_f32 *self, const float sample[])
+{
+    if ((self == NULL) || (self->memory == NULL) || (sample == NULL)) {
+        return PVID_NOT_READY;
+    }
+    const pvid_robot_design_f32 *design = self->config.design;
+    const uint32_t n = self->config.model->joints;
+    if (!are_finite(sample, 2u * n)) {
+        pvid_count_up(&self->rejected);
+        pvid_robot_gap_f32(self);
+        return PVID_REJECTED_NOT_FINITE;
+    }
+    for (uint32_t i = 0; i < (2u * n); i++) {
+        float *ring = &self->memory[self->at.ring + (2u * i * design->taps)];
+        ring[self->place] = sample[i];
+        ring[(uint32_t)self->place + design->taps] = sample[i];
+    }
+    self->place = (uint16_t)(((self->place + 1u) < design->taps) ? (self->place + 1u) : 0u);
+    if (self->filled < design->taps) {
+        self->filled++;
+        if (self->filled < design->taps) {
+            return PVID_WARMING_UP;
+        }
+    }
+    const uint32_t within = self->tick % design->decimation;
+    const uint32_t last = (uint32_t)design->decimation - 1u;
+    add_torques(self);
+    if (within == 0u) {
+        take_step(self);
+    }
+    if (within == ((last > 0u) ? 1u : 0u)) {
+        add_values(self);
+    }
+    const bool is_free = (last > 1u) ? (within > 1u) : (within == last);
+    pvid_reason reason = is_free ? do_task(self) : PVID_ACCUMULATED;
+    self->tick++;
+    if (self->tick == ((uint32_t)design->interval * design->decimation)) {
+        self->tick = 0;
+        end_interval(self);
+    }
+    return ((reason == PVID_ACCUMULATED) && (self->rows == 0u)) ? PVID_WARMING_UP : reason;
+}
+
+/* ---- results ---- */
+
+bool pvid_robot_read_f32(const pvid_robot_f32 *self, float estimate[], uint32_t *number)
+{
+    if ((self == NULL) || (self->memory == NULL) || (estimate == NULL)) {
+        return false;
+    }
+    return pvid_publication_read(&self->mark, &self->memory[self->at.shared], &self->memory[self->at.copy], estimate,
+                                 2u * (size_t)self->config.model->p * sizeof estimate[0], number);
+}
+
+bool pvid_robot_covariance_f32(const pvid_robot_f32 *self, uint8_t k, float out[])
+{
+    if ((self == NULL) || (self->memory == NULL) || (out == NULL) || !self->factor || (k >= self->config.model->p)) {
+        return false;
+    }
+    const float *m = &self->memory[self->at.m];
+    memset(out, 0, k * sizeof out[0]);
+    unit_forward(m, out, k, self->config.model->p);
+    backward(m, out, self->config.model->p);
+    return true;
+}
+
+uint32_t pvid_robot_hash_f32(uint32_t hash, const pvid_robot_f32 *self, pvid_reason reason)
+{
+    const float *memory = self->memory;
+    const uint32_t n = self->config.model->p;
+    for (uint32_t k = 0; k < n; k++) {
+        hash = pvid_fnv_word(hash, pvid_bits_f32(memory[self->at.p + k]));
+        hash = pvid_fnv_word(hash, pvid_bits_f32(memory[self->at.fresh + n + k]));
+    }
+    for (uint32_t i = 0; i < self->slots; i++) {
+        hash = pvid_fnv_word(hash, pvid_bits_f32(memory[self->at.f + i]));
+    }
+    for (uint32_t j = 0; j < self->config.model->joints; j++) {
+        hash = pvid_fnv_word(hash, pvid_bits_f32(self->q[j]));
+    }
+    return pvid_fnv_word(hash, (uint32_t)reason);
+}

@@ -1,0 +1,31 @@
+"""Robots on emulated boards: bits of the host, instructions, memory."""
+
+import numpy as np
+import pytest
+from test_robot_core import ARMS, made
+
+from pvid.board.boards import BOARDS
+from pvid.board.replay_image import play
+from pvid.board.robot_image import build_robot_image
+from pvid.codegen.files_robot import RobotFiles
+from pvid.codegen.robot_library import RobotNative
+
+
+@pytest.mark.parametrize(
+    ("arm", "board", "mean", "longest", "kilobytes"),
+    [("spatial", "mps2-an386", 4_000, 4_000, 40), ("panda", "mps2-an500", 20_000, 20_000, 128)],
+)
+def test_a_robot_on_a_board_has_the_bits_of_the_host(
+    arm: str, board: str, mean: int, longest: int, kilobytes: int
+) -> None:
+    target = BOARDS[board]
+    if target.missing:
+        pytest.skip(f"{', '.join(target.missing)} missing")
+    model, design, samples = made(arm, 0)
+    samples = samples[: int(2.5 * ARMS[arm])].copy()
+    samples[600, 0] = np.nan
+    _, hashes = RobotNative(model, design).run(samples)
+    report = play(target, build_robot_image(target, RobotFiles(model, "a test", design), samples)[0], 120.0)
+    assert report.hash == int(hashes[-1])
+    assert report.instructions_mean < mean and report.instructions_longest < longest
+    assert report.state_bytes + report.stack_used < 1000 * kilobytes

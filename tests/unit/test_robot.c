@@ -1,0 +1,324 @@
+/* A robot of one joint, a driven pendulum: what is identified, refused, restarted, forgotten. */
+#include "test.h"
+
+#include "pvid/elementary.h"
+#include "pvid/robot.h"
+
+#define P 4u
+#define L 5u
+#define D 3u
+#define TAPS 11u
+#define HALF (TAPS / 2u)
+#define RATE 200.0f
+#define ROOM 512u
+
+static const uint16_t end[1] = {P};
+static const uint8_t column[P] = {0, 1, 2, 3};
+static const uint16_t slot[4] = {1, 2, 3, 0};
+static const float gain[1] = {2.0f}; /* N*m per ampere */
+static const bool held[1] = {false};
+
+/* tau = d/dt (J q') + w sin q + Fv q' + Fc sgn q'. */
+static void values(const float in[], float out[])
+{
+    out[0] = pvid_sin_f32(in[0]);
+    out[1] = in[1];
+    out[2] = in[2];
+    out[3] = in[1];
+}
+
+static const pvid_robot_model_f32 model = {.joints = 1,
+                                           .p = P,
+                                           .forces = 3,
+                                           .entries = 4,
+                                           .end = end,
+                                           .column = column,
+                                           .slot = slot,
+                                           .gain = gain,
+                                           .held = held,
+                                           .values = values};
+static float position[HALF];
+static float rate[HALF];
+static float spline[4u * L];
+static float slope[4u * L];
+static float torque[8u * L * D];
+static const float start[P] = {0.1f, 1.0f, 0.0f, 0.0f};
+static const float start_sd[P] = {10.0f, 10.0f, 10.0f, 10.0f};
+static const double truth[P] = {0.3, 2.0, 0.2, 0.5};
+static pvid_robot_f32 robot;
+static float memory[ROOM];
+
+static double power(double u, int n)
+{
+    return (u > 0.0) ? pow(u, n) : 0.0;
+}
+
+static double b_spline(double u, int degree)
+{
+    static const double binomial[2][5] = {{1, -3, 3, -1, 0}, {1, -4, 6, -4, 1}};
+    double sum = 0.0;
+    for (int j = 0; j < 5; j++) {
+        sum += binomial[degree - 2][j] * power(u - j, degree);
+    }
+    return sum / ((degree == 2) ? 2.0 : 6.0);
+}
+
+/* Local lines instead of polynomials of degree 4: enough for a slow motion. */
+static pvid_robot_design_f32 design_of(void)
+{
+    const double ticks = (double)L * (double)D;
+    for (unsigned i = 0; i < HALF; i++) {
+        position[i] = 0.0f;
+        rate[i] = (i == 0u) ? (RATE * 8.0f / 12.0f) : ((i == 1u) ? (-RATE / 12.0f) : 0.0f);
+    }
+    for (unsigned i = 0; i < (4u * L); i++) {
+        const double u = (double)i / (double)L;
+        spline[i] = (float)b_spline(u, 3);
+        slope[i] = (float)(-(b_spline(u, 2) - b_spline(u - 1.0, 2)) * (double)RATE / ticks);
+    }
+    for (unsigned i = 0; i < (8u * L * D); i++) {
+        const double u = (double)(i % (4u * L * D)) / ticks + ((i < (4u * L * D)) ? 0.0 : 0.5 / ticks);
+        torque[i] = (float)(b_spline(u, 3) / (double)D);
+    }
+    return (pvid_robot_design_f32){TAPS, D, L, position, rate, spline, slope, torque, {1.0f, 0.0f, 0.0f, 0.0f}};
+}
+
+static pvid_robot_design_f32 design;
+
+static pvid_robot_config_f32 config_of(void)
+{
+    design = design_of();
+    return (pvid_robot_config_f32){&model, &design, start, start_sd, 20, 1000};
+}
+
+static void begin(void)
+{
+    const pvid_robot_config_f32 config = config_of();
+    assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
+}
+
+/* The joint and the current of its motor at a tick, with a parameter w. */
+static void sample_at(unsigned tick, double w, float sample[2])
+{
+    const double t = tick / (double)RATE;
+    const double q = sin(1.3 * t) + 0.6 * sin(2.9 * t + 1.0) + 0.3 * cos(4.1 * t);
+    const double v = 1.3 * cos(1.3 * t) + 1.74 * cos(2.9 * t + 1.0) - 1.23 * sin(4.1 * t);
+    const double a = -1.69 * sin(1.3 * t) - 5.046 * sin(2.9 * t + 1.0) - 5.043 * cos(4.1 * t);
+    const double noise = ((tick * 2654435761u) % 1000u) / 1000.0 - 0.5;
+    const double tau = truth[0] * a + w * sin(q) + truth[2] * v + truth[3] * ((v > 0.0) ? 1.0 : -1.0) + 0.1 * noise;
+    sample[0] = (float)q;
+    sample[1] = (float)(tau / 2.0);
+}
+
+static unsigned play(unsigned from, unsigned to, double w)
+{
+    unsigned updates = 0;
+    for (unsigned tick = from; tick < to; tick++) {
+        float sample[2];
+        sample_at(tick, w, sample);
+        updates += (pvid_robot_step_f32(&robot, sample) == PVID_UPDATED) ? 1u : 0u;
+    }
+    return updates;
+}
+
+static void require_truth(double w)
+{
+    float estimate[2u * P];
+    uint32_t number = 0;
+    assert_true(pvid_robot_read_f32(&robot, estimate, &number));
+    assert_true(number > 0u);
+    for (unsigned k = 0; k < P; k++) {
+        const double expected = (k == 1u) ? w : truth[k];
+        const double error = (double)estimate[k] - expected;
+        assert_true((estimate[P + k] > 0.0f) && (estimate[P + k] < 0.02f));
+        /* 4 standard errors, and 0.5 % of what lines and the steps lack. */
+        assert_true(fabs(error) < 4.0 * (double)estimate[P + k] + 0.005 * expected);
+    }
+}
+
+static void the_parameters_of_a_joint_are_found_with_their_errors(void **state)
+{
+    begin();
+    assert_true(play(0, 6000, 2.0) > 10u);
+    require_truth(2.0);
+}
+
+static void the_covariance_has_the_standard_errors(void **state)
+{
+    begin();
+    float column_of[P];
+    assert_false(pvid_robot_covariance_f32(&robot, 0, column_of));
+    float sample[2];
+    pvid_reason reason = PVID_WARMING_UP;
+    for (unsigned tick = 0; (reason != PVID_UPDATED) || (tick < 3000u); tick++) {
+        sample_at(tick, 2.0, sample);
+        reason = pvid_robot_step_f32(&robot, sample);
+    }
+    float estimate[2u * P];
+    float whole[P][P];
+    assert_true(pvid_robot_read_f32(&robot, estimate, NULL));
+    for (uint8_t k = 0; k < P; k++) {
+        assert_true(pvid_robot_covariance_f32(&robot, k, whole[k]));
+        assert_float_equal(sqrtf(whole[k][k]), estimate[P + k], 1.0e-5f * estimate[P + k]); /* a few roundings */
+    }
+    for (unsigned k = 0; k < P; k++) {
+        for (unsigned i = 0; i < k; i++) {
+            assert_float_equal(whole[k][i], whole[i][k], 1.0e-5f * estimate[P + k] * estimate[P + i]);
+        }
+    }
+    assert_false(pvid_robot_covariance_f32(&robot, P, column_of));
+}
+
+static void a_changed_joint_is_followed_with_a_short_memory(void **state)
+{
+    pvid_robot_config_f32 config = config_of();
+    config.memory = 100;
+    assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
+    (void)play(0, 6000, 2.0);
+    (void)play(6000, 24000, 2.5); /* 1200 rows: the older ones count 2^-10 */
+    require_truth(2.5);
+    assert_true(robot.rows <= 120u);
+}
+
+static void what_is_not_finite_restarts_the_splines_and_keeps_the_sums(void **state)
+{
+    begin();
+    (void)play(0, 6000, 2.0);
+    const uint32_t rows = robot.rows;
+    const float bad[2] = {1.0f, NAN};
+    assert_int_equal(pvid_robot_step_f32(&robot, bad), PVID_REJECTED_NOT_FINITE);
+    assert_int_equal(robot.rejected, 1);
+    assert_int_equal(play(6001, 6001 + TAPS + (3u * L * D), 2.0), 0);
+    assert_true((robot.rows == rows) && (robot.filled == TAPS));
+    (void)play(6001 + TAPS + (3u * L * D), 9000, 2.0);
+    assert_true(robot.rows > rows);
+    require_truth(2.0);
+}
+
+static void without_motion_nothing_is_published(void **state)
+{
+    begin();
+    float estimate[2u * P];
+    uint32_t number = 1;
+    unsigned held_ticks = 0;
+    for (unsigned tick = 0; tick < 3000u; tick++) {
+        const float still[2] = {0.0f, 1.0f};
+        const pvid_reason reason = pvid_robot_step_f32(&robot, still);
+        assert_int_not_equal(reason, PVID_REJECTED_SATURATED);
+        held_ticks += (reason == PVID_HELD_SINGULAR) ? 1u : 0u;
+    }
+    assert_true(pvid_robot_read_f32(&robot, estimate, &number));
+    /* The start holds where the rows are 0: its errors say so. */
+    for (unsigned k = 0; k < P; k++) {
+        assert_float_equal(estimate[k], start[k], 0.0f);
+        assert_float_equal(estimate[P + k], start_sd[k], 1.0e-4f);
+    }
+    assert_true((held_ticks == 0u) || (number == 0u));
+}
+
+/* Bits at random, of which many are infinities, NaN and huge: whatever is stored stays finite. */
+static void garbage_leaves_every_sum_finite(void **state)
+{
+    begin();
+    uint32_t word = 1;
+    for (unsigned tick = 0; tick < 60000u; tick++) {
+        float sample[2];
+        for (unsigned k = 0; k < 2u; k++) {
+            word = (word * 1664525u) + 1013904223u;
+            const uint32_t bits = (tick % 64u < 50u) ? ((word & 0x807FFFFFu) | ((100u + (word >> 26u)) << 23u)) : word;
+            memcpy(&sample[k], &bits, sizeof bits);
+        }
+        assert_true(pvid_robot_step_f32(&robot, sample) <= PVID_NOT_READY);
+    }
+    assert_true(robot.saturated > 0u);
+    for (uint32_t i = robot.at.s; i < robot.at.f + robot.slots; i++) {
+        assert_true(isfinite(memory[i]));
+    }
+    for (uint32_t i = robot.at.p; i < robot.at.next; i++) {
+        assert_true(isfinite(memory[i]));
+    }
+    (void)pvid_robot_gap_f32(&robot);
+}
+
+static void refuse(const pvid_robot_config_f32 *config, pvid_status status)
+{
+    memset(&robot, 0xFF, sizeof robot);
+    assert_int_equal(pvid_robot_init_f32(&robot, config, memory, ROOM), status);
+    const float sample[2] = {0.0f, 0.0f};
+    assert_int_equal(pvid_robot_step_f32(&robot, sample), PVID_NOT_READY);
+}
+
+static void what_is_out_of_range_is_refused_by_its_status(void **state)
+{
+    const pvid_robot_config_f32 sound = config_of();
+    pvid_robot_config_f32 config = sound;
+    pvid_robot_model_f32 other = model;
+    config.model = NULL;
+    refuse(&config, PVID_BAD_POINTER);
+    config.model = &other;
+    other.p = 65;
+    refuse(&config, PVID_BAD_MODEL);
+    other = model;
+    other.joints = 13;
+    refuse(&config, PVID_BAD_MODEL);
+    static const uint8_t twice[P] = {0, 1, 1, 3};
+    other = model;
+    other.column = twice;
+    refuse(&config, PVID_BAD_MODEL);
+    static const uint16_t beyond[4] = {1, 2, 3, 4};
+    other = model;
+    other.slot = beyond;
+    refuse(&config, PVID_BAD_MODEL);
+    config = sound;
+    design.taps = 10;
+    refuse(&config, PVID_BAD_DESIGN);
+    design = design_of();
+    spline[3] = NAN;
+    refuse(&config, PVID_BAD_DESIGN);
+    design = design_of();
+    design.interval = 3;
+    design.decimation = 1;
+    config.group = 3;
+    refuse(&config, PVID_BAD_WINDOW);
+    config = config_of();
+    config.group = 1;
+    refuse(&config, PVID_BAD_WINDOW);
+    static const float infinite[P] = {0.0f, INFINITY, 0.0f, 0.0f};
+    config = sound;
+    config.start = infinite;
+    refuse(&config, PVID_BAD_START);
+    static const float zero[P] = {1.0f, 0.0f, 1.0f, 1.0f};
+    config = sound;
+    config.start_sd = zero;
+    refuse(&config, PVID_BAD_START_SD);
+    config = sound;
+    config.memory = 7;
+    refuse(&config, PVID_BAD_FORGETTING);
+    assert_int_equal(pvid_robot_init_f32(&robot, &sound, memory, pvid_robot_memory_f32(&model, &design) - 1u),
+                     PVID_BAD_LAYOUT);
+    assert_int_equal(pvid_robot_init_f32(&robot, &sound, memory, pvid_robot_memory_f32(&model, &design)), PVID_OK);
+}
+
+static void before_init_nothing_is_done(void **state)
+{
+    float estimate[2u * P];
+    memset(&robot, 0, sizeof robot);
+    pvid_robot_gap_f32(&robot);
+    pvid_robot_gap_f32(NULL);
+    assert_int_equal(pvid_robot_step_f32(&robot, estimate), PVID_NOT_READY);
+    assert_int_equal(pvid_robot_step_f32(NULL, estimate), PVID_NOT_READY);
+    assert_false(pvid_robot_read_f32(&robot, estimate, NULL) || pvid_robot_read_f32(NULL, estimate, NULL));
+    assert_false(pvid_robot_covariance_f32(&robot, 0, estimate));
+}
+
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test(the_parameters_of_a_joint_are_found_with_their_errors),
+    cmocka_unit_test(the_covariance_has_the_standard_errors),
+    cmocka_unit_test(a_changed_joint_is_followed_with_a_short_memory),
+    cmocka_unit_test(what_is_not_finite_restarts_the_splines_and_keeps_the_sums),
+    cmocka_unit_test(without_motion_nothing_is_published),
+    cmocka_unit_test(garbage_leaves_every_sum_finite),
+    cmocka_unit_test(what_is_out_of_range_is_refused_by_its_status),
+    cmocka_unit_test(before_init_nothing_is_done),
+};
+RUN(tests)
