@@ -11,6 +11,7 @@ from in_process import pvid
 
 from pvid.base.console import DONE
 from pvid.base.errors import PvidError
+from pvid.cli.main import main
 from pvid.identification.survey import lines_of_a_model, proposals, surveyed, unit_of_name
 from pvid.models.simulated_rig import simulated_rig
 
@@ -73,6 +74,36 @@ def test_it_is_printed_and_drawn(file: Path, tmp_path: Path) -> None:
     assert shown.return_value == DONE and shown.stdout.startswith("of an instrument.csv: 2999 samples, 500 Hz, 5.996 s")
     assert "never changes" in shown.stdout and "pvid: input: half has a sample every 2 ticks" in shown.stderr
     assert (tmp_path / "columns.png").stat().st_size > 10_000
+
+
+def test_a_table_of_a_motor_is_known_as_people_write_it(tmp_path: Path) -> None:
+    """Names of several languages; a speed without a unit is doubted; the smooth top of a motion is not clipped."""
+    turns = np.round(3000 * np.sin(2 * np.pi * 0.3 * T), 0)
+    slow = np.round(SLOW, 3)
+    doubt = "speed states no unit: rad/s is assumed; write w=speed:rpm for rpm"
+    german = "'t=Zeit [s],V=Spannung [V],i=Strom [A],w=n [1/min]'"
+    for head, columns, doubts in (
+        ("time,V,i,speed", "t=time,w=speed", (doubt,)),
+        ("Zeit [s],Spannung [V],Strom [A],n [1/min]", german, ()),
+        ("t,U,I,n_rpm", "V=U,i=I,w=n_rpm:rev/min", ()),
+    ):
+        file = written(tmp_path / "motor.csv", head, [numbers(T), numbers(slow), numbers(SLOW), numbers(turns, 0)])
+        first = proposals(survey := surveyed(file))[0]
+        assert (first.mechanism, first.columns, first.doubts) == ("motor_speed", columns, doubts)
+        assert all("clip" not in remark for one in survey.facts for remark in one.remarks)
+
+
+def test_a_refusal_ends_with_the_commands_that_look_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path / "lab.csv", "time,U_in,U_C", [numbers(T), ["5"] * 1500 + ["0"] * 1500, numbers(SLOW)])
+    monkeypatch.setattr("sys.argv", ["pvid", "identify", str(file)])
+    with pytest.raises(SystemExit) as left:
+        main()
+    refusal, *commands = capsys.readouterr().err.splitlines()
+    assert left.value.code == 2 and "has the names of its columns time, U_in, U_C" in refusal
+    assert commands == pvid("look", file).stdout.splitlines()[-len(commands) :]
+    assert any("--model rc_step --columns t=time,u=U_in,v=U_C" in one for one in commands)
 
 
 FOREIGN = {

@@ -10,7 +10,7 @@ import pytest
 from fleet_rows import DAY, row
 
 from pvid.fleet.changes import FALSE_ALARMS, Change, Series
-from pvid.fleet.dates import began_of
+from pvid.fleet.dates import began_of, named_without_date
 from pvid.fleet.page import Fleet, page, sentence
 from pvid.fleet.row import Row
 
@@ -120,3 +120,29 @@ def test_a_recording_says_when_it_began(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     os.utime(path, (1000, 1000))
     assert began_of(path) == (seconds, by)
+
+
+@pytest.mark.parametrize(
+    ("name", "board"),
+    [
+        ("board3_2026-09-01.csv", "board3"),
+        ("2026-09-01_1405 axis-2.csv", "axis-2"),
+        ("board_1-2026-09-01.csv", "board_1"),
+        ("pump-017.npz", "pump"),
+        ("run7.csv", ""),
+        ("2026-09-01.csv", ""),
+        ("0007_2026-09-01.csv", ""),
+        ("monday.csv", ""),
+    ],
+)
+def test_a_board_is_in_the_name_of_its_recordings(name: str, board: str) -> None:
+    assert named_without_date(Path(name)) == board
+
+
+def test_a_board_that_differs_from_all_others_is_named() -> None:
+    def fleet(last: float) -> Fleet:
+        values = {"b1": 10.0, "b2": 10.1, "b3": 9.9, "b4": last}
+        return Fleet.of([row(board, day, value + 0.001 * day) for board, value in values.items() for day in range(3)])
+
+    assert fleet(20.0).odd == ["b4: g is 20.0 m/s^2, of all other boards 9.9 to 10.1"]
+    assert not fleet(10.2).odd

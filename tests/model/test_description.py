@@ -36,6 +36,7 @@ SHIPPED = {  # theta of each kind of row, unknowns
     "heater": ([3], 3),
     "mass_on_spring": ([5], 5),
     "mecanum": ([5, 5, 4], 6),
+    "motor_speed": ([4, 5], 7),
     "pmsm": ([4, 5, 5], 8),
     "quadrotor_axis": ([4], 4),
     "rc_step": ([3], 3),

@@ -110,14 +110,13 @@ def test_a_recording_is_of_the_mechanism_that_has_its_signals(tmp_path: Path, na
     assert rig_of(path).model == name
 
 
-def test_columns_of_no_shipped_mechanism_are_refused_with_the_mechanisms(tmp_path: Path) -> None:
+def test_columns_of_no_shipped_mechanism_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     rows = "\n".join(f"{k / 100},{k % 7},{k % 5}" for k in range(100))
     path.write_text(f"t,humidity,pressure\n{rows}\n")
     with pytest.raises(PvidError) as caught:
         rig_of(path)
-    assert "no shipped mechanism has these columns" in str(caught.value)
-    assert "kapitza (y, phi)" in str(caught.value)
+    assert "no shipped mechanism has the names of its columns t, humidity, pressure" in str(caught.value)
 
 
 def test_a_file_without_rows_is_refused_for_that(tmp_path: Path) -> None:

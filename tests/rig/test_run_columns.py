@@ -103,6 +103,14 @@ def test_program_added_table_lines_are_read(content: str, tmp_path: Path) -> Non
     assert_is_the_run(written(tmp_path, content))
 
 
+def test_a_word_beside_the_first_row_alone_is_a_remark(tmp_path: Path) -> None:
+    first, _, others = table(";", ",", header="", close=";").partition(";\n")
+    head = "A lab;;;\nt;phi;y;words\n(s);(rad);(m);\n"
+    run = read_run(written(tmp_path, f"{head}{first};let go\n{others}"))
+    np.testing.assert_array_equal(run.phi, PHI)
+    assert run.notes == ("left out in front of the table: line 1, 'A lab;;;'", "line 3 states units")
+
+
 @pytest.mark.parametrize("name", ["run.tsv", "run.txt", "run.dat", "RUN.CSV"])
 def test_other_endings_of_text_are_read(name: str, tmp_path: Path) -> None:
     assert_is_the_run(written(tmp_path, table("\t"), name))

@@ -71,9 +71,9 @@ def command(patterns: tuple[str, ...], **given: Any) -> int:
 
     FILE may be a pattern in quotes, 'runs/*.csv' or 'fleet/**/*.pvlog', or a folder: all recordings in it. A second
     call with the same -o computes only what is new or has changed, also after an interruption. The page shows what
-    changed in the parameters of each board: a board is the USB serial number of a log, or the folder of a run. With
-    --report it has links to the reports of `identify`. With --together the FILEs of a folder are recordings of one
-    mechanism, which are identified together.
+    changed in the parameters of each board: a board is the USB serial number of a log; of a run its folder, and its
+    name without date or number: board3_2026-09-01.csv. With --report it has links to the reports of `identify`. With
+    --together the FILEs of a folder are recordings of one mechanism, which are identified together.
 
     Exit code 1: a log is not equal to its twin. 4: a parameter changed by --alarm or more. 3: nothing was identified.
     """
@@ -90,6 +90,8 @@ def command(patterns: tuple[str, ...], **given: Any) -> int:
         write_stderr(f"pvid: {len(failures) - _SHOWN} more failures are in {job.page}")
     for alarm in alarms_of(fleet):
         click.echo(f"changed: {alarm}")
+    for odd in fleet.odd:
+        click.echo(f"apart: {odd}")
     click.echo(f"rows: {job.out}; page: {job.page}")
     return _code(fleet)
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import sys
+from pathlib import Path
 
 import click
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from pvid.base.errors import PvidError
 from pvid.base.wording import printable, typed_name, with_unit
 from pvid.cli.input import print_notes
-from pvid.identification.survey import ColumnFacts, Proposal, Survey, lines_of_a_model, proposals
+from pvid.identification.survey import ColumnFacts, Proposal, Survey, lines_of_a_model, proposals, surveyed
 from pvid.models.mechanisms import unused_input
 
 _DIGITS = 4
@@ -30,8 +32,15 @@ def print_survey(survey: Survey) -> None:
     click.echo(f"{survey.path.name}: {clock}{pieces}; time: {printable(survey.names[survey.at])}")
     print_notes(recording.notes)
     Console(width=None if sys.stdout.isatty() else 140).print(_columns(survey))
-    for line in _advice(survey):
-        click.echo(line)
+    click.echo("\n".join(_advice(survey)))
+
+
+def next_lines(path: Path) -> list[str]:
+    """What the columns of a file can be of, and what to type next; none where it is no table."""
+    try:
+        return _advice(surveyed(path))
+    except (PvidError, OSError):
+        return []
 
 
 def _columns(survey: Survey) -> Table:
@@ -66,7 +75,12 @@ def _advice(survey: Survey) -> list[str]:
         ]
     lines = ["By names and units it can be:" if len(found) > 1 else "By names and units it is:"]
     for one in found[:_MOST]:
-        lines += [f"  {one.title}", f"    {one.command(file)}", *_constants(one)]
+        lines += [
+            f"  {one.title}",
+            f"    {one.command(file)}",
+            *_constants(one),
+            *(f"    {doubt}" for doubt in one.doubts),
+        ]
         if unused := unused_input(one.mechanism, survey.names):
             lines.append(f"    but {unused}")
     lines.append("Another mechanism is a model file of ten lines: host/docs/models.md.")

@@ -18,7 +18,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, OWN_ERROR, write_stderr
-from pvid.base.errors import PvidError
+from pvid.base.errors import PvidError, UnknownMechanismError
 from pvid.base.freed_memory import keep_freed
 from pvid.base.output import watch
 from pvid.base.packages import PACKAGES, installing
@@ -95,6 +95,11 @@ def main() -> None:
         code = BAD_INPUT
     except PvidError as error:
         write_stderr(f"pvid: {error}")
+        if isinstance(error, UnknownMechanismError):
+            from pvid.cli.look_text import next_lines  # loads SymPy
+
+            for line in next_lines(error.path):
+                write_stderr(line)
         code = BAD_INPUT
     except OSError as error:
         write_stderr(f"pvid: {'' if error.filename is None else f'{error.filename}: '}{reason(error)}")

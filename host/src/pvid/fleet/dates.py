@@ -12,6 +12,7 @@ _DATED = re.compile(
     r"(?<!\d)(20\d\d)([-_./]?)(0[1-9]|1[0-2])\2(0[1-9]|[12]\d|3[01])(?!\d)"
     r"(?:[T _-]+([01]\d|2[0-3])[:h_-]?([0-5]\d)(?:[:m_-]?([0-5]\d))?)?"
 )
+_NUMBERED = re.compile(r"(.*[^\W\d_].*?)[\W_]+\d+$")
 _CLOCK = re.compile(r"(?:^|[\n,;\t])\"?(\d{10})(\d{3}|\d{6}|\d{9})?(?:\.\d*)?\"?(?=[,;\t])")
 
 
@@ -36,6 +37,15 @@ def began_of(path: Path) -> tuple[float, str]:
         if (dated := _DATED.search(name)) is not None and (found := _seconds(dated)) is not None:
             return found, "name"
     return path.stat().st_mtime, "file"
+
+
+def named_without_date(path: Path) -> str:
+    """The board in the name of a file: `board3_2026-09-01.csv` and `board3-017.csv` are of board3; "": it has none."""
+    stem = path.name.removesuffix(path.suffix)
+    bare = _DATED.sub("", stem)
+    numbered = _NUMBERED.fullmatch(stem) if bare == stem else None
+    name = (bare if bare != stem else numbered[1] if numbered else "").strip(" _-.")
+    return name if re.search(r"[^\W\d_]", name) else ""
 
 
 def _seconds(dated: re.Match[str]) -> float | None:

@@ -19,7 +19,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
 from pvid.base.rounding import percent, prefix_of, with_prefix
-from pvid.fleet.changes import Change, Series, series_of
+from pvid.fleet.changes import Change, Float, Series, series_of
 from pvid.fleet.row import EQUAL, Row
 from pvid.show import answer_figure as of
 from pvid.show.document import document, picture, table, text
@@ -29,6 +29,7 @@ _LONGEST = 40  # letters of a board in the figure's legend: its last ones
 _COLORS = ("C0", "C1", "C2", "C4", "C8", "C9")
 _PANEL_INCHES = 1.9
 _SHARED = 0.5  # of the recordings, from which on a warning is one of all
+_FEWEST_BOARDS, _ODD, _ODD_PART = 4, 4.0, 0.1  # that are compared; of the others' range, of its error; of the value
 _DIGITS = 0.1  # of a change: of the last two digits that are shown
 _DAY, _SHORTEST = 86400.0, 60.0  # seconds
 
@@ -60,6 +61,27 @@ class Fleet:
             (one for one in found if (abs(one[1].part) >= self.alarm) == alarms), key=lambda one: -abs(one[1].part)
         )
 
+    @cached_property
+    def odd(self) -> Sequence[str]:
+        """A sentence on each board whose value is far from those of all others, which agree; the farthest first."""
+        found = []
+        for own in _by_parameter(self).values():
+            latest = np.array([one.latest[0] for one in own])
+            for k, one in enumerate(own if len(own) >= _FEWEST_BOARDS else ()):
+                others, value = np.delete(latest, k), float(latest[k])
+                usual = float(np.median(others))
+                off = abs(value - usual)
+                if usual and off > max(_ODD * float(np.ptp(others)), _ODD_PART * abs(usual), _ODD * one.latest[1]):
+                    shown, _, unit, scale = with_prefix(value, off / 10, one.unit)
+                    among = " to ".join(
+                        with_prefix(float(end) / scale, off / scale / 10, "")[0] for end in _ends(others)
+                    )
+                    words = (
+                        f"{one.board}: {one.name} is {shown}{' ' + unit if unit else ''}, of all other boards {among}"
+                    )
+                    found.append((off / abs(usual), words))
+        return [words for _, words in sorted(found, reverse=True)]
+
     @property
     def title(self) -> str:
         """As "Fleet of 2 boards, 1 to 6 November 2026"."""
@@ -83,6 +105,10 @@ class Fleet:
                 kinds.setdefault(kind, []).append(own)
         answered = sum(row.verdict is not None for row in self.rows)
         return {kind: (own[0], len(own)) for kind, own in kinds.items() if len(own) > max(1, _SHARED * answered)}
+
+
+def _ends(values: Float) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
 
 
 def sentence(series: Series, change: Change) -> str:
@@ -131,6 +157,8 @@ def _changed(fleet: Fleet) -> Iterator[str]:
         yield f"<ul>{items}</ul>"
     else:
         yield f"<p>No parameter changed by {percent(fleet.alarm)} or more.</p>"
+    if fleet.odd:
+        yield f"<p>Boards apart from the others:</p><ul>{''.join(f'<li>{text(one)}</li>' for one in fleet.odd)}</ul>"
     if small:
         items = "".join(f"<li>{text(sentence(*one))}</li>" for one in small)
         heading = f"{_count(len(small), 'smaller change')}, beyond chance"
@@ -266,10 +294,12 @@ def _drawn(figure: Figure, fleet: Fleet, parameters: Mapping[str, Sequence[Serie
 
 
 def _short(boards: Sequence[str]) -> dict[str, str]:
-    """Names of boards without the folders that all of them are in."""
+    """Names of boards without the folders that all of them are in, and without the name that all files have."""
     parts = {board: board.split(os.sep) for board in boards}
     common = len(os.path.commonprefix([own[:-1] for own in parts.values()])) if len(boards) > 1 else 0
-    return {board: os.sep.join(own[common:]) for board, own in parts.items()}
+    alike = len({own[-1] for own in parts.values()}) == 1 and all(len(own) > common + 1 for own in parts.values())
+    end = -1 if alike and len(boards) > 1 else None
+    return {board: os.sep.join(own[common:end]) for board, own in parts.items()}
 
 
 def _dates(start: float, end: float, between: str) -> str:
@@ -277,7 +307,7 @@ def _dates(start: float, end: float, between: str) -> str:
     first, last = (datetime.fromtimestamp(one, UTC) for one in (start, end))
     if first.date() == last.date():
         clocks = list(dict.fromkeys(f"{one:%H:%M}" for one in (first, last)))
-        return f"{between.join(clocks)} on {_date(end)}" if between.strip() == "and" else _date(end)
+        return f"{between.join(clocks)} on {_date(end)}" if between.strip() == "and" and len(clocks) > 1 else _date(end)
     month = f" {first:%B}" if first.month != last.month or first.year != last.year else ""
     year = f" {first.year}" if first.year != last.year else ""
     return f"{first.day}{month}{year}{between}{_date(end)}"

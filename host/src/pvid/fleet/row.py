@@ -15,7 +15,7 @@ from pvid.base.errors import PvidError
 from pvid.base.version import __version__
 from pvid.base.wording import reason
 from pvid.board.mechanism_board import board_of
-from pvid.fleet.dates import began_of
+from pvid.fleet.dates import began_of, named_without_date
 from pvid.log.file import Segment
 from pvid.log.reader import LogReader
 from pvid.log.rig import LOG_SUFFIX, hello_of_log, settings_text_of_log
@@ -72,7 +72,8 @@ class Row:
     ----------
     key : of its content and the question
     path : as it was given; of recordings that are identified together their folder
-    board : USB serial number of the board that sent a log, else its name and folder; of a run its folder
+    board : USB serial number of the board that sent a log, else its name and folder; of a run its folder, and what its
+        file is called beside a date or a number
     began : seconds since 1970
     dated : what says so: "log", "recording", "name" or, of a run without a date, "file"
     samples : that were identified
@@ -118,6 +119,7 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
     try:
         key = question.key(*places)
         board, began, dated = _origin(place)
+        board = board if isinstance(given, str) or place.suffix == LOG_SUFFIX else path
     except (OSError, PvidError) as error:
         return Row(key, path, str(place.parent), 0.0, failure=_told(error), took=time.monotonic() - start)
     try:
@@ -169,7 +171,7 @@ def _told(error: OSError | PvidError) -> str:
 def _origin(path: Path) -> tuple[str, float, str]:
     """The board, when it began, and what says so."""
     if path.suffix != LOG_SUFFIX:
-        return str(path.parent), *began_of(path)
+        return str(path.parent / named_without_date(path)), *began_of(path)
     began, dated, serial = path.stat().st_mtime, "file", ""
     for record in LogReader(path):
         if isinstance(record.item, Segment):

@@ -34,6 +34,7 @@ _HELD_SHARE = 0.1  # a column that keeps its value from row to row but in so few
 _HELD_SAMPLES = 4  # for which a set value stays, at least
 _FEW_LEVELS = 12
 _CLIPPED_SAMPLES, _CLIPPED_STRETCHES = 3, 2  # in a row at the end of the range, and how often
+_ROUNDED = 4  # of the samples at the next value: the top of a smooth motion in steps of a sensor has up to 2.5 times
 _AT_THE_END = 0.98  # share of the other stretches of equal samples, in which a clipped one is longer
 _IRREGULAR = 0.3  # scatter of the blank stretches, of their mean
 _EVEN = 0.1  # scatter of the steps from row to row, of their mean
@@ -42,6 +43,7 @@ _EPOCH = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))  # of seconds they are 1.7e9
 _OF_MOTION = 0.99  # share of a signal's power
 _SPECTRUM = 1 << 17  # samples
 _SI = ("rad", "m", "s", "rad/s", "m/s", "V", "A", "N", "N*m", "K", "Hz", "W", "Pa", "kg", "m/s^2", "rad/s^2")
+_OFTEN_OTHER = {"rad/s": ("rpm", 0.0), "rad": ("deg", 3.2)}  # another usual unit, and numbers above which it can be
 _CONFLICTING = frozenset("m s a k n v h d g c w j t f l in min".split())  # also words of names
 
 
@@ -276,7 +278,8 @@ def _clipped(x: Float, unit: str) -> list[str]:
         elsewhere = lengths[held != end]
         usual = np.quantile(elsewhere, _AT_THE_END) if len(elsewhere) else np.inf
         long = own[(own >= _CLIPPED_SAMPLES) & (own > 2 * usual)]
-        if len(long) >= _CLIPPED_STRETCHES:
+        beside = x[x != end][np.argmin(np.abs(x[x != end] - end))]
+        if len(long) >= _CLIPPED_STRETCHES and own.sum() > _ROUNDED * (x == beside).sum():
             value = f"{end:.6g} {unit}".rstrip()
             found.append(f"stands at its {word} value {value} in {len(long)} stretches: does it clip?")
     return found
@@ -312,6 +315,7 @@ class Proposal:
     columns : text of --columns; "": the columns have the names of the signals
     constants : that its user must state, each with its unit
     used : names of columns
+    doubts : a sentence on each column without a unit whose numbers can be in another one
     """
 
     mechanism: str
@@ -319,6 +323,7 @@ class Proposal:
     columns: str
     constants: tuple[tuple[str, str], ...]
     used: frozenset[str]
+    doubts: tuple[str, ...] = ()
 
     def command(self, file: str) -> str:
         """What to type next; a constant that must be stated is 0.00 there."""
@@ -339,7 +344,7 @@ def proposals(survey: Survey) -> tuple[Proposal, ...]:
     all_of = [one for name in shipped_names() if (one := _proposal(name, survey, measured, stated)) is not None]
     specific = most_specific({one.mechanism: one.used for one in all_of})
     found = [one for one in all_of if one.mechanism in specific]
-    return tuple(sorted(found, key=lambda one: (bool(one.columns), -len(one.used))))
+    return tuple(sorted(found, key=lambda one: (bool(one.columns), -len(one.used), bool(one.constants))))
 
 
 def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: Mapping[str, str]) -> Proposal | None:
@@ -353,18 +358,25 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
             return None
         own[channel.name] = alike[0]
     units = {one.name: one.unit for one in channels_of(description)}
+    sizes = {one.name: max(abs(one.low), abs(one.high)) for one in survey.facts}
+    doubts: list[str] = []
     parts = [] if survey.time == "t" else [survey.time]
     for signal, name in own.items():
         unit = unit_in(name, units[signal]) or unit_of_name(name)
         written = typed(survey.names, survey.names.index(name))
         in_si = not unit or scale_to(units[signal], unit) == Scale()
+        other, largest = _OFTEN_OTHER.get(units[signal], ("", np.inf))
+        if name not in (signal, *stated) and not unit and sizes[name] > largest:
+            doubts.append(
+                f"{name} states no unit: {units[signal]} is assumed; write {signal}={written}:{other} for {other}"
+            )
         if name != signal or not in_si:
             parts.append(f"{signal}={written}" + ("" if in_si or unit_in_brackets(name) else f":{unit}"))
     constants = tuple((one.name, one.unit) for one in description.knowns if one.required)
     columns = ",".join(parts)
-    return Proposal(
-        mechanism, description.title, shlex.quote(columns) if columns else "", constants, frozenset(own.values())
-    )
+    typed_columns = shlex.quote(columns) if columns else ""
+    used = frozenset(own.values())
+    return Proposal(mechanism, description.title, typed_columns, constants, used, tuple(doubts))
 
 
 def _fits(unit: str | None, si: str) -> bool:

@@ -56,7 +56,8 @@ def values_of(
     ----------
     covariance : of p by noise [n_p, n_p]
     gains, shifts : as Identified has them; no shifts: no terms were tried
-    judged : of each parameter; an output is identified where all parameters that it depends on are
+    judged : of each parameter; an output is identified where all parameters that it depends on are, or
+        where its error is small with the errors of those that are not
     verdict : whose word a parameter has; an output has the worst of those that it depends on
     of_known : the first of the gains are those of constants, in which an output may stand by itself
     """
@@ -74,20 +75,26 @@ def values_of(
 
     values = {}
     for one in model.outputs:
-        used = [of for symbol, of in zip(model.p, judged, strict=True) if one.value.has(symbol)]
-        missing = next((of for of in used if of.status == "not_identified"), Judged())
-        slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := output_at(model, p, one))[1])
-        if missing.status != "not_identified" and not np.isfinite([found[0], *slope]).all():
+        value, slope = output_at(model, p, one)
+        own = [k for k, symbol in enumerate(model.p) if one.value.has(symbol)]
+        lost = [k for k in own if judged[k].status == "not_identified"]
+        word = worst(verdict.of(model.p_names[k]) for k in own if k not in lost)
+        missing = judged[min(lost, key=lambda k: judged[k].has_error)] if lost else Judged()
+        if lost and missing.has_error:
+            hardly = math.hypot(np.sqrt(slope @ covariance @ slope), np.linalg.norm(gains @ slope)) <= WIDE * abs(value)
+            missing, word = (Judged(), worst([word, "usable"])) if hardly else (missing, word)
+        if missing.status == "not_identified":
+            slope = np.where([of.status == "not_identified" for of in judged], 0.0, slope)
+        elif not np.isfinite([value, *slope]).all():
             missing = Judged("not_identified", "its formula has no real value at these parameters")
-        word = worst(verdict.of(name) for name, p_k in zip(model.p_names, model.p, strict=True) if one.value.has(p_k))
         direct = np.zeros(len(gains))
         if of_known:
-            by_known = _of_constants(model, p, one, found[0])
+            by_known = _of_constants(model, p, one, value)
             direct[: len(by_known)] = by_known
-        own = shown(one.unit, found[0], slope, missing, word, direct)
-        if own.value is not None and not (own.se or 0.0) <= WIDE * abs(own.value):
-            own = replace(own, word=worst([word, "usable"]))
-        values[one.name] = own
+        found = shown(one.unit, value, slope, missing, word, direct)
+        if found.value is not None and not (found.se or 0.0) <= WIDE * abs(found.value):
+            found = replace(found, word=worst([word, "usable"]))
+        values[one.name] = found
     for k, unknown in enumerate(model.unknowns):
         values[unknown.name] = shown(unknown.unit, float(p[k]), np.eye(len(p))[k], judged[k], verdict.of(unknown.name))
     return values

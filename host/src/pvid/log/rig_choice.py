@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pvid.base.errors import PvidError
+from pvid.base.errors import PvidError, UnknownMechanismError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed, typed_name
 from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log, named_in
@@ -146,11 +146,17 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
                 "with --columns"
             )
         return found[0]
+    if not found and run_path is not None:
+        columns_there = f" {', '.join(there)}" if there else ""
+        raise UnknownMechanismError(
+            f"{what}: no shipped mechanism has the names of its columns{columns_there}: name one with --model, and "
+            f"which column is which signal with --columns; {typed_name()} look shows what the file has",
+            run_path,
+        )
     if not found:
-        look = "" if run_path is None else f"; {typed_name()} look shows what the file has"
         signals = [f"{name} ({', '.join(one.name for one in description_of(name).signals)})" for name in names()]
         raise PvidError(
             f"{what}: no shipped mechanism has these columns: name yours with --model, and its columns with --columns; "
-            f"they are {listed(signals, 'or')}{look}"
+            f"they are {listed(signals, 'or')}"
         )
     raise PvidError(f"{what} can be of {listed(found, 'or')}: name the mechanism with --model")

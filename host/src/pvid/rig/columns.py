@@ -49,7 +49,7 @@ TIME = Channel("t", "s", usual=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock
 _USUAL_NAMES = {
     "rad": r"phi|φ|angle|ang|theta|winkel|enc|deg|rad|pend|°",
     "m": r"height|^h$|^h[^a-z]|pivot|cart|base|pos|disp|laser|dist|^x$|^y$|^z",
-    "rad/s": r"omega|ω|rate|speed|veloc|rpm|gyro|drehzahl",
+    "rad/s": r"omega|ω|rate|speed|veloc|rpm|gyro|drehzahl|^n$|^n[^a-z]",
     "m/s": r"speed|veloc|^v$",
     "V": r"volt|spannung|^u$|^u[^a-z]|^v$",
     "A": r"curr|strom|amp|^i$|^i[^a-z]",

@@ -267,7 +267,8 @@ def _with_head(
 ) -> Layout:
     """With the names in front of the numbers, and the units; `usual` are lines of the table's width."""
     width = len(usual[0].cells)
-    numbers = [k for k in range(width) if sum(one.kinds[k] in "nte" for one in usual) >= _MOSTLY * len(usual)]
+    kinds = ["".join(one.kinds[k] for one in usual) for k in range(width)]
+    numbers = [k for k, own in enumerate(kinds) if own.strip("xe") and own.count("x") <= (1 - _MOSTLY) * len(usual)]
     if head is None:
         head = _guessed(lines, _first(usual, numbers), width, numbers)
         if head is not None and not sought[0] and len(head[1]) != width:

@@ -128,11 +128,13 @@ class Judged:
     status : "near_zero": it is smaller than the run shows, and `below` bounds it
     reason : a clause, of what is not identified or near 0; else None
     below : with 95 % [unit of the parameter]
+    has_error : of what is not identified: whether its standard error is one, which is only too large
     """
 
     status: ParameterStatus = "identified"
     reason: str | None = None
     below: float | None = None
+    has_error: bool = False
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,8 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
                 else f"the standard error of {{}} is {with_unit(se[k], one.unit, 2)}, "
                 f"beside a value of {with_unit(p, one.unit, 2)}"
             )
-            out.append(Judged("not_identified", why.format(one.name)))
+            has_error = not ran_down and bool(np.isfinite(se[k]))
+            out.append(Judged("not_identified", why.format(one.name), has_error=has_error))
         elif own_scale and se[k] > UNKNOWN * abs(p):
             out.append(_near_zero(one, p, float(se[k])))
         else:

@@ -1,0 +1,1 @@
+"""A DC motor with current sensor and tachometer."""

@@ -1,0 +1,13 @@
+"""A DC motor whose speed is measured: a table of voltage, current and speed."""
+
+from pvid.model import Model, sgn
+
+model = Model("DC motor, speed measured")
+V = model.input("V", "V", hold="zoh", reach=12)
+i = model.sensor("i", "A", resolution=10 / 2**12, reach=5)
+w = model.sensor("w", "rad/s", resolution=0.05, reach=1000)
+R, L, k = model.unknown("R", "ohm", 1.2), model.unknown("L", "H", 3e-3), model.unknown("k", "N*m/A", 0.05)
+J, b, Tc = model.unknown("J", "kg*m^2", 2e-4), model.unknown("b", "N*m*s", 1e-4), model.unknown("Tc", "N*m", 0.012)
+i0 = model.unknown("i0", "A", 0.0, positive=False, sd=0.1)  # offset of the current sensor
+model.equation(L * i.d() + R * (i - i0) + k * w - V)
+model.equation(J * w.d() + b * w + Tc * sgn(w) - k * (i - i0))
