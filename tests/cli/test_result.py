@@ -119,7 +119,7 @@ def test_a_result_is_saved_and_loaded(found: pvid.Result, tmp_path: Path) -> Non
         assert again.validate(data()).sensors == found.validate(data()).sensors
     with pytest.raises(PvidError, match="a result from a file has no report: they need the recording"):
         again.report(tmp_path / "a.html")
-    with pytest.raises(PvidError, match="heated_plate"):  # a file never chooses what runs
+    with pytest.raises(PvidError, match="heated_plate: load it with model="):  # a file never chooses what runs
         pvid.load(path)
     saved = json.loads(path.read_text())
     assert saved["parameters"]["C"]["value"] == found["C"].value

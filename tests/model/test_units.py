@@ -122,3 +122,10 @@ def test_powers_are_fractions_too() -> None:
 def test_what_is_no_product_of_powers_is_no_unit(text: str) -> None:
     with pytest.raises(PvidError, match="no unit"):
         dimension_of_unit(text)
+
+
+def test_a_number_in_place_of_a_constant_is_named_as_the_cause() -> None:
+    model = Model("oscillator")
+    x, k = model.sensor("x", "m", resolution=1e-4), model.unknown("k", "N/m", 1.0)
+    with pytest.raises(PvidError, match=r"a number has no unit: a constant that has one is a model\.known"):
+        model.equation(2.5e-4 * x.d(2) + k * x)

@@ -32,7 +32,7 @@ from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
 from pvid.model.readable import aligned, latex_name, latex_unit
 from pvid.models.mechanisms import compiled_of
-from pvid.models.registry import asked_for, shipped
+from pvid.models.registry import asked_for, names, shipped
 from pvid.oracle.weak.words import Word
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import MechanismRig, channels_of, parsed_file
@@ -389,6 +389,8 @@ def _loaded(text: str, model: str | os.PathLike[str] | Model | None) -> Result:
         details = json.loads(text)
         own = details.pop("saved")
         rig = MechanismRig.of_document(toml_document(own["rig"]), None if model is None else asked_for(model))
+        if model is None and rig.model not in names():
+            raise PvidError(f"it is of a model of its own, {details['model']}: load it with model=..., that model")
         of = compiled_of(shipped(rig.model, "the file") if isinstance(rig.model, str) else rig.model)
         if details["model"] != of.name:
             raise PvidError(f"it is of the mechanism {details['model']}, not of {of.name}")

@@ -19,10 +19,6 @@ from pvid.log.rig import LOG_SUFFIX
 def command(run_path: Path, figure: Path | None) -> int:
     """Says what is in a FILE, and what to type next.
 
-    \b
-    pvid look run.csv
-    pvid look run.csv --figure run.png
-
     Its columns with their units, ranges and steps, what is set and what is measured, clipped, missing or constant; its
     clock; the mechanisms of the list that the columns can be of, each with its command; else lines for a model file.
     Names and units decide which mechanism it can be: which one it is, `identify` says.

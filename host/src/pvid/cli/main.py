@@ -24,6 +24,7 @@ from pvid.base.output import watch
 from pvid.base.packages import PACKAGES, installing
 from pvid.base.version import __version__
 from pvid.base.wording import reason, shown, typed_name
+from pvid.cli.short_help import with_short_help
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
     "Identify": {
@@ -147,8 +148,7 @@ class Commands(click.Group):
         if cmd_name not in self.list_commands(ctx):
             return None
         module, attribute = _ELSEWHERE.get(cmd_name, (f"pvid.cli.{cmd_name}", "command"))
-        command: click.Command = getattr(import_module(module), attribute)
-        return command
+        return with_short_help(getattr(import_module(module), attribute))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

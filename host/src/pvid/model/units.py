@@ -163,5 +163,7 @@ def _of_sum(expression: sp.Expr, of: Mapping[str, Dimension]) -> Dimension | Non
     if len(by_unit) > 1:
         usual, *_, odd = sorted(by_unit, key=lambda one: -len(by_unit[one]))
         wrong, right = (readable(_unsigned(by_unit[one][0])) for one in (odd, usual))
-        raise ModelError(f"the term {wrong} has the unit {odd}, but {right}, which is added to it, has {usual}")
+        bare = any(not one.as_coeff_Mul()[0].is_Integer for terms in by_unit.values() for one in terms)
+        more = "; a number has no unit: a constant that has one is a model.known(NAME, UNIT, VALUE)" if bare else ""
+        raise ModelError(f"the term {wrong} has the unit {odd}, but {right}, which is added to it, has {usual}{more}")
     return next(iter(by_unit), None)
