@@ -51,6 +51,7 @@ static void any_standing(pvid_standing_judge *judge)
     Frama_C_make_unknown((char *)judge, sizeof *judge);
     judge->fits = (uint8_t)any_u32(0, 32);
     judge->fit = any_u32(0, PVID_STANDING_CLIP);
+    judge->square = any_u32(0, 3u * PVID_STANDING_CLIP);
     judge->contradicts = any_bool();
     judge->grew = any_bool();
     judge->misfit = any_bool();

@@ -17,8 +17,13 @@ static int start_again(void **state)
 /* A window that is published, and fits. */
 static pvid_standing_window good(void)
 {
-    const pvid_standing_window window = {
-        .published = true, .solved = true, .arrived = true, .judges = true, .freedom = FREEDOM, .ratio = ONE};
+    const pvid_standing_window window = {.published = true,
+                                         .solved = true,
+                                         .arrived = true,
+                                         .judges = true,
+                                         .freedom = FREEDOM,
+                                         .own = ONE,
+                                         .ratio = ONE};
     return window;
 }
 
@@ -121,6 +126,31 @@ static void residuals_above_the_noise_are_a_misfit_and_one_window_is_none(void *
     is(PVID_STANDING_DOUBTED, PVID_DOUBT_MISFIT);
     take(good(), 100);
     is(PVID_STANDING_VALID, 0);
+}
+
+/* Two windows with a ratio of 3 and two with a better one, 40 times. */
+static void take_scattered(uint32_t better, uint32_t own)
+{
+    pvid_standing_window window = good();
+    window.own = own;
+    (void)start_again(NULL);
+    for (int i = 0; i < 160; i++) {
+        window.ratio = ((i % 4) < 2) ? PVID_STANDING_CLIP : better;
+        take(window, 1);
+    }
+}
+
+/* Means of 2.0 and 2.2, 0.5 and 0.7 above 1.5; three times their scatter is 0.76 and 0.61. The limit of white rows
+ * alone is 1.75. */
+static void ratios_that_scatter_are_a_misfit_beyond_their_scatter(void **state)
+{
+    (void)state;
+    take_scattered(ONE, ONE);
+    is(PVID_STANDING_VALID, 0);
+    take_scattered((14u * ONE) / 10u, ONE);
+    is(PVID_STANDING_DOUBTED, PVID_DOUBT_MISFIT);
+    take_scattered(ONE, ONE / 2u); /* half of it is the sensors' noise, which is white */
+    is(PVID_STANDING_DOUBTED, PVID_DOUBT_MISFIT);
 }
 
 static void windows_before_p_arrives_are_no_misfit(void **state)
@@ -264,6 +294,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test_setup(what_contradicts_twice_withdraws, start_again),
     cmocka_unit_test_setup(larger_errors_are_a_doubt_until_the_next_publication, start_again),
     cmocka_unit_test_setup(residuals_above_the_noise_are_a_misfit_and_one_window_is_none, start_again),
+    cmocka_unit_test_setup(ratios_that_scatter_are_a_misfit_beyond_their_scatter, start_again),
     cmocka_unit_test_setup(windows_before_p_arrives_are_no_misfit, start_again),
     cmocka_unit_test_setup(without_a_limit_of_misfit_there_is_none, start_again),
     cmocka_unit_test_setup(six_rejected_windows_of_sixteen_are_a_doubt, start_again),

@@ -7,11 +7,12 @@
 
 #define MEMORY 32u /* windows in the mean of the variance ratios */
 #define ONE_Q16 65536u
-#define REJECTED_MAX 6u /* of the last 16 windows */
-#define CONFIRMED 8u    /* valid publications in a row: p is trusted */
-#define PATIENCE 12u    /* windows without a publication until p starts again */
-#define STARTS 6u       /* in a row; then */
-#define PAUSE 64u       /* windows until it may start again */
+#define FIT_MAX (ONE_Q16 + (ONE_Q16 / 2u)) /* largest mean of the ratios that is a fit without chance */
+#define REJECTED_MAX 6u                    /* of the last 16 windows */
+#define CONFIRMED 8u                       /* valid publications in a row: p is trusted */
+#define PATIENCE 12u                       /* windows without a publication until p starts again */
+#define STARTS 6u                          /* in a row; then */
+#define PAUSE 64u                          /* windows until it may start again */
 
 static void count_up(uint8_t *count)
 {
@@ -59,6 +60,18 @@ static uint32_t count_window(pvid_standing_judge *self, bool rejected)
     return (ones(self->history) >= REJECTED_MAX) ? (uint32_t)PVID_DOUBT_REJECTS : 0u;
 }
 
+/* The mean of n numbers, the last of them x. */
+static uint32_t mean_with(uint32_t mean, uint32_t n, uint32_t x)
+{
+    return ((mean * (n - 1u)) + x) / n;
+}
+
+/* x^2 in Q16. */
+static uint32_t square_q16(uint32_t x)
+{
+    return (uint32_t)(((uint64_t)x * x) >> 16u);
+}
+
 static uint32_t cause_of_age(const pvid_standing_judge *self, uint16_t age_max)
 {
     return ((age_max > 0u) && (self->now.age > age_max)) ? (uint32_t)PVID_DOUBT_AGED : 0u;
@@ -75,19 +88,25 @@ PVID_COLD void pvid_standing_skip(pvid_standing_judge *self, bool rejected, uint
     doubt(self, causes | cause_of_age(self, age_max));
 }
 
-/* The mean of the ratios and its limit: 1.5 (1 + 3 standard deviations of chance), chance^2 = 2 / (freedom fits). */
+/* The mean of the ratios is a misfit above both of its limits: 1.5 (1 + 3 chance), chance^2 = 2 / (freedom fits) of
+ * white rows; and 1.5 + 3 own scatter, scatter^2 = 2 variance / (fits - 1) of the ratios themselves. An equation's own
+ * error is not white: it has fewer degrees of freedom than its rows. 2: neighbours share half of their samples. */
 static void take_fit(pvid_standing_judge *self, const pvid_standing_window *window)
 {
     if (!window->judges || !(window->arrived || (self->fits > 0u))) {
         return;
     }
     self->fits = (uint8_t)((self->fits < MEMORY) ? (self->fits + 1u) : MEMORY);
-    self->fit = ((self->fit * (self->fits - 1u)) + window->ratio) / self->fits;
-    const uint32_t two_thirds = (self->fit * 2u) / 3u;
-    const uint32_t above = (two_thirds > ONE_Q16) ? (two_thirds - ONE_Q16) : 0u;
-    const uint64_t square = (uint64_t)above * above;
+    self->fit = mean_with(self->fit, self->fits, window->ratio);
+    self->square = mean_with(self->square, self->fits, square_q16(window->ratio));
+    const uint64_t excess = (self->fit > FIT_MAX) ? (self->fit - FIT_MAX) : 0u;
+    const uint32_t fitted = square_q16(self->fit);
+    const uint64_t variance = (self->square > fitted) ? (self->square - fitted) : 0u;
+    const uint64_t of_own = variance * square_q16(window->own);
+    const uint64_t rows = (uint64_t)window->freedom * self->fits;
     self->misfit = (self->fits >= PVID_STANDING_WINDOWS) &&
-                   ((square * ((uint32_t)window->freedom * self->fits)) > ((uint64_t)18u << 32u));
+                   (((2u * rows) * (excess * excess)) > ((uint64_t)81u << 32u)) &&
+                   (((excess * excess) * (self->fits - 1u)) > (18u * of_own));
 }
 
 /* A publication: valid without a cause, if it has been compared with enough windows. */

@@ -25,6 +25,7 @@ typedef struct {
     bool errs;        /* the residuals were taken for a larger error of an equation than the design's */
     uint16_t freedom; /* rows less nuisances */
     uint16_t age_max; /* of the configuration */
+    uint32_t own;     /* part of the expectation that is the equations' own errors, Q16, 0..1 */
     uint32_t ratio;   /* residual variance over its expectation, Q16, at most PVID_STANDING_CLIP */
 } pvid_standing_window;
 

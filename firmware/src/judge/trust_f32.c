@@ -375,7 +375,7 @@ PVID_COLD void pvid_trust_compare_f32(pvid_trust_f32 *self, size_t n_p, const pv
 }
 
 PVID_COLD void pvid_trust_stand_f32(pvid_trust_f32 *self, pvid_reason verdict, pvid_reason reason, float variance_ratio,
-                                    uint16_t freedom, bool errs, const pvid_estimate_f32 *candidate)
+                                    uint16_t freedom, bool errs, uint32_t own, const pvid_estimate_f32 *candidate)
 {
     pvid_standing_window window;
     window.published = verdict == PVID_UPDATED;
@@ -385,6 +385,7 @@ PVID_COLD void pvid_trust_stand_f32(pvid_trust_f32 *self, pvid_reason verdict, p
     window.freedom = freedom;
     window.age_max = self->config.age_max;
     window.errs = errs;
+    window.own = own;
     window.ratio = PVID_STANDING_CLIP; /* NaN too */
     if (variance_ratio < (float)(PVID_STANDING_CLIP >> 16u)) {
         window.ratio = (uint32_t)(variance_ratio * 65536.0f);
@@ -434,7 +435,7 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
     const pvid_reason verdict =
         pvid_trust_decide_f32(self, estimator, reason, size, above_noise, variance_ratio, candidate);
     const pvid_reason reported = pvid_trust_publish_f32(self, estimator, verdict, reason, candidate);
-    pvid_trust_stand_f32(self, verdict, reason, variance_ratio, freedom, false, candidate);
+    pvid_trust_stand_f32(self, verdict, reason, variance_ratio, freedom, false, 0, candidate);
     return reported;
 }
 

@@ -19,9 +19,10 @@ pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *est
                                    pvid_reason reason, pvid_estimate_f32 *candidate);
 
 /* The standing of the published estimate, behind that. freedom: rows of the group less nuisances. errs: the
- * residuals were taken for a larger error of an equation than the design's. */
+ * residuals were taken for a larger error of an equation than the design's; own: part of the expectation that is the
+ * design's, Q16. */
 void pvid_trust_stand_f32(pvid_trust_f32 *self, pvid_reason verdict, pvid_reason reason, float variance_ratio,
-                          uint16_t freedom, bool errs, const pvid_estimate_f32 *candidate);
+                          uint16_t freedom, bool errs, uint32_t own, const pvid_estimate_f32 *candidate);
 
 /* Whether these are shared errors of n_p parameters, as of trust.h; NULL: none. */
 bool pvid_trust_shared_are_valid_f32(const float shared[], size_t n_p);

@@ -392,7 +392,7 @@ PVID_COLD static void compare(pvid_trust_q31 *self, size_t n_p, const pvid_estim
 }
 
 PVID_COLD void pvid_trust_stand_q31(pvid_trust_q31 *self, pvid_reason judged, pvid_reason reason,
-                                    int64_t variance_ratio, uint16_t freedom, bool errs,
+                                    int64_t variance_ratio, uint16_t freedom, bool errs, uint32_t own,
                                     const pvid_estimate_q31 *candidate)
 {
     const int64_t most = (int64_t)PVID_STANDING_CLIP << (PVID_VARIANCE_RATIO_BITS - 16);
@@ -405,6 +405,7 @@ PVID_COLD void pvid_trust_stand_q31(pvid_trust_q31 *self, pvid_reason judged, pv
     window.freedom = freedom;
     window.age_max = self->config.age_max;
     window.errs = errs;
+    window.own = own;
     window.ratio = (uint32_t)pvid_round_shift_q31((ratio > 0) ? ratio : 0, PVID_VARIANCE_RATIO_BITS - 16u);
     if (pvid_standing_take(&self->standing, &window)) {
         memcpy(self->trusted, candidate->p, sizeof self->trusted);
@@ -451,7 +452,7 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
     const pvid_reason judged =
         pvid_trust_decide_q31(self, estimator, reason, size, above_noise, variance_ratio, candidate);
     const pvid_reason reported = pvid_trust_publish_q31(self, estimator, judged, reason, candidate);
-    pvid_trust_stand_q31(self, judged, reason, variance_ratio, freedom, false, candidate);
+    pvid_trust_stand_q31(self, judged, reason, variance_ratio, freedom, false, 0, candidate);
     return reported;
 }
 

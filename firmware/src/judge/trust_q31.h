@@ -10,7 +10,7 @@ pvid_reason pvid_trust_decide_q31(pvid_trust_q31 *self, const pvid_estimator_q31
 pvid_reason pvid_trust_publish_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason judged,
                                    pvid_reason reason, pvid_estimate_q31 *candidate);
 void pvid_trust_stand_q31(pvid_trust_q31 *self, pvid_reason judged, pvid_reason reason, int64_t variance_ratio,
-                          uint16_t freedom, bool errs, const pvid_estimate_q31 *candidate);
+                          uint16_t freedom, bool errs, uint32_t own, const pvid_estimate_q31 *candidate);
 
 /* Whether these are shared errors of n_p parameters, as of trust_q31.h; NULL: none. */
 bool pvid_trust_shared_are_valid_q31(const int32_t shared[], size_t n_p);

@@ -733,8 +733,10 @@ PVID_COLD static bool stand_stage(pvid_weak_f32 *self)
     for (size_t i = 0; i < self->design->model->kinds; i++) {
         errs = errs || (finish->error[i].variance > self->design->error_variance[i]);
     }
+    const float sensors = finish->expected / finish->explained;
+    const uint32_t own = (sensors < 1.0f) ? (uint32_t)((1.0f - sensors) * 65536.0f) : 0u; /* NaN too */
     pvid_trust_stand_f32(&self->trust, (pvid_reason)finish->verdict, finish->reason,
-                         ratio_to(finish, finish->explained), (uint16_t)finish->free, errs, &finish->candidate);
+                         ratio_to(finish, finish->explained), (uint16_t)finish->free, errs, own, &finish->candidate);
     return false;
 }
 

@@ -609,15 +609,11 @@ PVID_COLD static bool cluster_stage(pvid_weak_q31 *self)
     return end < n_p;
 }
 
-/* The window's residual variance over what the sensors and the design's errors of the equations explain. */
-static int64_t explained_ratio(const pvid_weak_finish_q31 *self)
+/* Part of the explained variance of a window that is the sensors'. */
+static pvid_scaled_q31 sensors_part(const pvid_weak_finish_q31 *self)
 {
-    if ((self->known.sensors.m <= 0) || (self->known.explained.m <= 0)) {
-        return self->rss;
-    }
-    const pvid_scaled_q31 part = pvid_scaled_over_q31(self->known.sensors, self->known.explained);
-    const pvid_scaled_q31 ratio = pvid_scaled_of_q31(self->rss, -(int32_t)PVID_VARIANCE_RATIO_BITS);
-    return pvid_scaled_fixed_q31(pvid_scaled_times_q31(ratio, part), PVID_VARIANCE_RATIO_BITS);
+    const bool known = (self->known.sensors.m > 0) && (self->known.explained.m > 0);
+    return known ? pvid_scaled_over_q31(self->known.sensors, self->known.explained) : pvid_scaled_of_q31(1, 0);
 }
 
 static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
@@ -631,7 +627,12 @@ static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
     const pvid_reason judged = pvid_trust_decide_q31(&self->trust, &self->estimator, finish->reason, finish->size,
                                                      finish->work.solve.above_noise, finish->rss, candidate);
     *reason = pvid_trust_publish_q31(&self->trust, &self->estimator, judged, finish->reason, candidate);
-    pvid_trust_stand_q31(&self->trust, judged, finish->reason, explained_ratio(finish), finish->free, errs, candidate);
+    const pvid_scaled_q31 sensors = sensors_part(finish);
+    const pvid_scaled_q31 ratio = pvid_scaled_of_q31(finish->rss, -(int32_t)PVID_VARIANCE_RATIO_BITS);
+    const int64_t part = pvid_clamp_q31(pvid_scaled_fixed_q31(sensors, 16), 65536);
+    pvid_trust_stand_q31(&self->trust, judged, finish->reason,
+                         pvid_scaled_fixed_q31(pvid_scaled_times_q31(ratio, sensors), PVID_VARIANCE_RATIO_BITS),
+                         finish->free, errs, (uint32_t)(65536 - part), candidate);
     if (finish->left < INT32_MAX) {
         begin_anew(self);
     }

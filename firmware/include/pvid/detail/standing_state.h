@@ -9,6 +9,7 @@
 /* Only the functions of src/judge/standing.h write to it. */
 typedef struct {
     uint32_t fit;         /* mean of the windows' residual variances over their expectation, each at most 3, Q16 */
+    uint32_t square;      /* mean of their squares, Q16 */
     pvid_standing now;    /* of the published estimate */
     uint16_t history;     /* a bit for each of the last 16 windows: rows were rejected */
     uint8_t fits;         /* windows in `fit`, since p arrived */
