@@ -13,6 +13,7 @@ import numpy as np
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
 from pvid.identification.answer import Answer, Factors, Float, Value
+from pvid.identification.bodies import REACHED, Bodies, bodies_of
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.chain import INERTIAL
 from pvid.model.compiled import CompiledModel
@@ -127,6 +128,12 @@ class RobotAnswer(Answer):
             reasons.append(Reason("unpredicted", text))
         return Verdict(tuple(reasons))
 
+    @cached_property
+    def bodies(self) -> Bodies | None:
+        """Possible ones, nearest to the file's; None: the file has none."""
+        assert self.model.chain is not None
+        return bodies_of(self.model.chain, self.fit.p, self.fit.covariance, self.fit.undetermined)
+
     @property
     def lines(self) -> list[str]:
         """Windows, combinations, and the prediction."""
@@ -138,6 +145,12 @@ class RobotAnswer(Answer):
             f"{design.taps} samples",
             *(f"{chain.name_of(one)} = {chain.closed_form(one)}" for one in combined),
         ]
+        if self.bodies is not None and np.max(np.abs(self.bodies.off)) > REACHED:
+            worst = int(np.argmax(np.abs(self.bodies.off)))
+            lines.append(
+                f"no possible bodies (mass and inertia positive) have all these values: the nearest ones differ by "
+                f"{abs(self.bodies.off[worst]):.2g} standard errors of {self.model.p_names[self.bodies.base[worst]]}"
+            )
         return [*lines, f"predicts torques that were not fitted: {listed(self.prediction)}"]
 
     def as_json(self) -> dict[str, Any]:
@@ -148,7 +161,13 @@ class RobotAnswer(Answer):
         for one in chain.base:
             entry = out["parameters"][chain.name_of(one)]
             entry |= {"combination": chain.closed_form(one), "file": chain.of_file(one)}
+        joints = [one.name for one in chain.joints]
+        bodies = None if self.bodies is None else {
+            name: dict(zip(INERTIAL, map(float, one), strict=True))
+            for name, one in zip(joints, self.bodies.inertial, strict=True)
+        }  # fmt: skip
         return out | {
+            "bodies": bodies,
             "prediction": {one.name: one.as_json() for one in self.prediction},
             "window_s": self.fit.design.functions.length,
             "windows": self.fit.windows,
