@@ -46,20 +46,28 @@ def test_a_clean_run_is_valid_at_its_end_and_never_withdrawn() -> None:
     assert int(published) > 20 and int(doubted) < 0.1 * int(published) and (withdrawn, valid) == ("0", "1 of 1")
 
 
-@pytest.mark.parametrize(("core", "reading"), [("f32", 1e3), ("f32", np.nan), ("q31", 1e3)])
-def test_an_estimate_is_valid_until_its_age(core: str, reading: float) -> None:
-    """Where windows are dropped, or samples rejected one by one."""
+@pytest.mark.parametrize(
+    ("core", "reading", "period"),
+    [
+        *(("f32", 1e3, 1), ("f32", np.nan, 1), ("q31", 1e3, 1)),
+        *((core, reading, n) for core, reading in (("f32", np.nan), ("q31", 1e3)) for n in (2, 10, 100, 900, 1700)),
+    ],
+)
+def test_an_estimate_is_valid_until_its_age(core: str, reading: float, period: int) -> None:
+    """Where windows are dropped, or samples rejected, all or one in `period`; in 1700 ticks a window is discarded."""
     own = standing.board("kapitza")
     run = own.simulation.run(1)
     first = len(run["phi"]) // 2
-    run["phi"][first:] = reading
+    run["phi"][first::period] = reading
     if core == "f32":
         config = replace(own.config, trust=replace(own.config.trust, age_max=8))
         record = replace(own, config=config).record(samples_of(config, run))
     else:
         made = weak_q31_for_rig_like_the_shipped(own.simulation.model)
-        fixed = replace(made.config, trust=replace(made.config.trust, age_max=8))
-        record = weak_native_q31(made.made, made.parameters, fixed).identifier().run_samples(made.counts_of(run))
+        config = replace(made.config, trust=replace(made.config.trust, age_max=8))
+        record = weak_native_q31(made.made, made.parameters, config).identifier().run_samples(made.counts_of(run))
     age, state = record.standing[first:] & 0xFFFF, standing.state_of(record)[first:]
-    assert state[0] == Standing.VALID and age[-1] > 9
+    window = config.design.hop * config.design.decimation
+    passed, waits = len(age) / window, period / window  # windows; it grows at a reject or behind a window
+    assert state[0] == Standing.VALID and passed - waits - 1 <= age[-1] - age[0] <= passed + 1 and passed > 12
     assert np.array_equal(state == Standing.DOUBTED, age > 8) and record.standing[-1] >> 24 == Doubt.AGED

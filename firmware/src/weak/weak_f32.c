@@ -16,6 +16,7 @@
 #include "weak/limits_f32.h"
 #include "weak/weak_finish_f32.h"
 #include "weak/weak_front_f32.h"
+#include "weak/weak_signals.h"
 #include "weak/weak_step_f32.h"
 #include "weak/white_f32.h"
 
@@ -143,17 +144,31 @@ PVID_COLD static void restart(pvid_weak_f32 *self)
     choose_task(self);
 }
 
-/* A restart by which samples are lost: as many as a window has new ones age the estimate as a window does that is
- * dropped. */
+/* Ticks in which the estimate becomes older by a window. */
+static inline uint32_t ticks_of_window(const pvid_weak_f32 *self)
+{
+    return (uint32_t)self->design->hop * self->design->decimation;
+}
+
+/* Behind a window that is in the age, or was published. */
+static void count_window(pvid_weak_f32 *self)
+{
+    const uint32_t window = ticks_of_window(self);
+    self->ticks = ((self->trust.standing.now.age > 0u) && (self->ticks > window)) ? (self->ticks - window) : 0u;
+}
+
+/* A restart: the ticks that no window has counted make the estimate older, and so does the one that is missing. */
 PVID_COLD static void lose(pvid_weak_f32 *self)
 {
-    const uint32_t hop = self->design->hop;
-    const uint32_t decimation = self->design->decimation;
-    const uint32_t halves = (self->sums.halves < 2u) ? self->sums.halves : 0u;
-    self->lost += (((halves * hop) + self->sums.index) * decimation) + 1u;
+    const pvid_weak_front_f32 *front = &self->front;
+    if ((front->needs == PVID_WEAK_NEEDS_NEXT) && front->seen) {
+        self->ticks++; /* the first one, which is no block's */
+    }
+    self->ticks += (front->decimation + 1u) - front->wait;
     restart(self);
-    if (self->lost >= (hop * decimation)) {
-        self->lost = 0;
+    const uint32_t windows = self->ticks / ticks_of_window(self);
+    self->ticks -= windows * ticks_of_window(self);
+    for (uint32_t left = windows; left > 0u; left--) {
         pvid_trust_skip_f32(&self->trust, false);
     }
 }
@@ -308,6 +323,7 @@ PVID_NOINLINE static pvid_reason end_half(pvid_weak_f32 *self)
     } else {
         pvid_weak_finish_skip_f32(&self->finish);
         pvid_trust_skip_f32(&self->trust, false);
+        count_window(self);
     }
     return reason;
 }
@@ -380,6 +396,7 @@ static pvid_reason process_window(pvid_weak_f32 *self)
         left--;
     } while (left > 0u);
     if (!pvid_weak_finish_is_busy_f32(&self->finish)) {
+        count_window(self);
         choose_task(self);
     }
     return (pvid_reason)self->finish.report;
@@ -411,6 +428,7 @@ PVID_COLD static void begin_run(pvid_weak_f32 *self)
 PVID_NOINLINE static pvid_reason end_block(pvid_weak_f32 *self, const float sample[])
 {
     const uint8_t decimation = pvid_weak_decimation(self->front.decimation);
+    self->ticks += decimation;
     const bool steps = pvid_weak_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
     self->task_after_step = self->task;
     if (!steps && !self->history.ran && (PVID_COUNT(PVID_EXACT_RUNS, self->design->model->runs) > 0u)) {

@@ -12,6 +12,7 @@
 #include "weak/valid_q31.h"
 #include "weak/weak_finish_q31.h"
 #include "weak/weak_front_q31.h"
+#include "weak/weak_signals.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define OFFSET_LIMIT ((int32_t)1 << 30)
@@ -48,17 +49,31 @@ static void restart(pvid_weak_q31 *self)
     choose_task(self);
 }
 
-/* A restart by which samples are lost: as many as a window has new ones age the estimate as a window does that is
- * dropped. */
+/* Ticks in which the estimate becomes older by a window. */
+static inline uint32_t ticks_of_window(const pvid_weak_q31 *self)
+{
+    return (uint32_t)self->design->hop * self->design->decimation;
+}
+
+/* Behind a window that is in the age, or was published. */
+static void count_window(pvid_weak_q31 *self)
+{
+    const uint32_t window = ticks_of_window(self);
+    self->ticks = ((self->trust.standing.now.age > 0u) && (self->ticks > window)) ? (self->ticks - window) : 0u;
+}
+
+/* A restart: the ticks that no window has counted make the estimate older, and so does the one that is missing. */
 PVID_COLD static void lose(pvid_weak_q31 *self)
 {
-    const uint32_t hop = self->design->hop;
-    const uint32_t decimation = self->design->decimation;
-    const uint32_t halves = (self->accumulator.sums.halves < 2u) ? self->accumulator.sums.halves : 0u;
-    self->lost += (((halves * hop) + self->accumulator.values.index) * decimation) + 1u;
+    const pvid_weak_front_q31 *front = &self->accumulator.front;
+    if ((front->needs == PVID_WEAK_NEEDS_NEXT) && front->seen) {
+        self->ticks++; /* the first one, which is no block's */
+    }
+    self->ticks += (front->decimation + 1u) - front->wait;
     restart(self);
-    if (self->lost >= (hop * decimation)) {
-        self->lost = 0;
+    const uint32_t windows = self->ticks / ticks_of_window(self);
+    self->ticks -= windows * ticks_of_window(self);
+    for (uint32_t left = windows; left > 0u; left--) {
         pvid_trust_skip_q31(&self->trust, false);
     }
 }
@@ -169,6 +184,7 @@ static void drop(pvid_weak_q31 *self)
 {
     pvid_weak_finish_skip_q31(&self->finish);
     pvid_trust_skip_q31(&self->trust, false);
+    count_window(self);
 }
 
 /* A whole window. Returns PVID_ACCUMULATED, or the reason why it is dropped. */
@@ -200,6 +216,7 @@ PVID_NOINLINE static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t 
 {
     const uint16_t index = self->accumulator.values.index;
     const uint8_t half = self->accumulator.values.half;
+    self->ticks += self->accumulator.front.decimation;
     const pvid_weak_tick tick = pvid_weak_accumulator_end_q31(&self->accumulator);
     if ((tick != PVID_WEAK_REJECTED) && (self->drive_min != NULL) && (self->accumulator.values.index != index)) {
         add_drive(self, index == 0u, reading);
@@ -217,6 +234,7 @@ static inline pvid_reason advance_finish(pvid_weak_q31 *self)
     for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
         pvid_weak_finish_step_q31(self, &reason);
         if (!pvid_weak_finish_is_busy_q31(&self->finish)) {
+            count_window(self);
             choose_task(self);
             return reason;
         }

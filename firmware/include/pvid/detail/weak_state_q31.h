@@ -224,7 +224,7 @@ struct pvid_weak_q31 {
     uint8_t stages_per_tick; /* stages of a whole window per tick */
     bool warm;               /* a window has been complete since the restart */
     bool frozen;             /* complete windows are dropped */
-    uint32_t lost;           /* ticks of a window that restarts have cost */
+    uint32_t ticks;          /* since the publication, less those of the windows in its age */
     pvid_weak_drive_q31 drive;
     pvid_weak_accumulator_q31 accumulator;
     pvid_weak_finish_q31 finish;
