@@ -1,6 +1,7 @@
 /* The fixed-point factor and solve, against float64, and what is left where there is none. */
 #include "test.h"
 
+#include "solve/assess_q31.h"
 #include "solve/cholesky_q31.h"
 
 #define ONE 1073741824.0 /* 2^30 */
@@ -100,8 +101,33 @@ static void the_largest_sums_fit(void **state)
     assert_true(pvid_cholesky_factor_q31(&factor, PVID_MAX_P, (const int32_t (*)[PVID_MAX_P])s));
     int32_t found[PVID_MAX_P];
     (void)pvid_cholesky_solve_q31(&factor, rhs, found);
+    const int32_t largest = pvid_x_max_q31(PVID_MAX_P);
     for (size_t i = 0; i < PVID_MAX_P; i++) {
-        assert_true((found[i] >= -PVID_X_MAX) && (found[i] <= PVID_X_MAX));
+        assert_true((found[i] >= -largest) && (found[i] <= largest));
+    }
+}
+
+/* The column of U^-1 of two unknowns that the data can hardly tell apart, beside others: their standard error is from
+ * it.
+ */
+static void the_largest_column_of_an_inverse_fits(void **state)
+{
+    for (uint8_t n = 2; n <= PVID_MAX_P; n++) {
+        int32_t s[PVID_MAX_P][PVID_MAX_P] = {{0}};
+        for (size_t i = 0; i < n; i++) {
+            s[i][i] = 1 << 28;
+        }
+        s[0][1] = (1 << 28) - 150; /* a pivot of 1.1 times the least one that is significant */
+        pvid_cholesky_q31 factor;
+        assert_true(pvid_cholesky_factor_q31(&factor, n, (const int32_t (*)[PVID_MAX_P])s));
+        const double part = s[0][1] / (double)s[1][1];
+        const int32_t one = (int32_t)1 << pvid_unit_bits_q31(n);
+        const int32_t rhs[PVID_MAX_P] = {0, one};
+        int32_t x[PVID_MAX_P];
+        pvid_cholesky_lower_q31(&factor, rhs, x);
+        assert_true(fabs((x[0] / (2.0 * one)) * sqrt((1.0 - part) * (1.0 + part)) + part) <
+                    1.0e-2); /* the pivot is a difference in its 20th bit */
+        assert_int_equal(x[1], 2 * one);
     }
 }
 
@@ -159,6 +185,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test(solving_returns_what_was_multiplied),
     cmocka_unit_test(indefinite_matrix_gives_zero_first_pivot),
     cmocka_unit_test(the_largest_sums_fit),
+    cmocka_unit_test(the_largest_column_of_an_inverse_fits),
     cmocka_unit_test(only_eliminated_columns_are_read),
     cmocka_unit_test(a_block_keeps_its_largest_entry_in_so_many_bits),
     cmocka_unit_test(a_scale_ends_at_the_widest),

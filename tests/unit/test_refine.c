@@ -349,6 +349,15 @@ static void test_init_refuses(void **state)
     const pvid_refine_config_f32 config = good();
     assert_int_equal(pvid_refine_init_f32(&refinement, &config, 1, NULL), PVID_BAD_DESIGN); /* it needs two */
     assert_int_equal(pvid_refine_init_f32(NULL, &config, 2, NULL), PVID_BAD_POINTER);
+    const float shared[10] = {0.01f, 1.0f, 0.5f, 0.0f, 0.02f, 0.0f, -1.0f, 0.0f, 0.0f, 0.3f};
+    const float wrong[3][2] = {{0.0f, NAN}, {0.0f, -0.01f}, {1.0f, -1.01f}}; /* place, value */
+    for (size_t i = 0; i < 3u; i++) {
+        float bad[10];
+        memcpy(bad, shared, sizeof bad);
+        bad[(size_t)wrong[i][0]] = wrong[i][1];
+        assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2, bad), PVID_BAD_SHARED);
+    }
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2, shared), PVID_OK);
     assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2, NULL), PVID_OK);
 }
 

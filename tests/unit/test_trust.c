@@ -162,8 +162,22 @@ static void sums_without_digits_fade(void **state)
     assert_int_equal(groups_of_fading(&left), 4);
 }
 
+static void the_second_stage_is_given_errors_without_the_shared(void **state)
+{
+    share(0.03, 0.5, 0.0);
+    for (int i = 0; i < 8; i++) {
+        an_estimate estimate = candidate(0.02, 1.0e-2);
+        const pvid_reason reason =
+            pvid_trust_judge_f32(&trust, &estimator, PVID_UPDATED, 0.0f, true, 1.0f, 20, &estimate);
+        assert_true((reason == PVID_UPDATED) || (i < 3));
+        assert_float_equal(estimate.se[0], 0.4f, 0.0f);
+    }
+    assert_true(published_error(0) > 0.7);
+}
+
 static const struct CMUnitTest tests[] = {
     TRUST_CASES cmocka_unit_test_setup(nan_counts_as_the_worst, start_again),
     cmocka_unit_test_setup(sums_without_digits_fade, start_again),
+    cmocka_unit_test_setup(the_second_stage_is_given_errors_without_the_shared, start_again),
 };
 RUN(tests)

@@ -121,7 +121,7 @@ typedef struct pvid_refine_config_f32 {
 #endif
     float step_limit; /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 1.8 at most;
                          recommended: 2 */
-    float se_max;     /* largest relative standard error of a published estimate, > 0 */
+    float se_max;     /* largest relative standard error of a published estimate, without the shared errors, > 0 */
     float distance;   /* relative distance from the weak form's estimate that the bias of its equations explains, >= 0.
                          0: the weak form has the same equations; an estimate is then published only if the geometric
                          mean of its standard errors is below that of the weak form */
@@ -155,15 +155,16 @@ extern const pvid_weak_refiner_f32 pvid_refiner_f32;
 
 /* Initialises `self`. samples: in the argument of step. shared: errors that all windows share, of trust.h, which are
  * added to those of published estimates; must outlive `self`; NULL: none. Fails iff
- *   - a pointer is NULL (PVID_BAD_POINTER), or
- *   - a field of config is out of its range (the status names it). */
+ *   - `self` or `config` is NULL (PVID_BAD_POINTER),
+ *   - a field of config is out of its range (the status names it), or
+ *   - a number of `shared` is out of its range, or the library is compiled with PVID_SHARED = 0 (PVID_BAD_SHARED). */
 pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config, size_t samples,
                                  const float shared[]);
 
 /* One tick.
  *   sample:  the samples of signal[].sample, taken at the same time
- *   weak:    the estimate of the weak form with its standard errors, published or not, if it is new at this tick;
- *            else NULL
+ *   weak:    the estimate of the weak form, its standard errors without the shared ones, published or not, if it is
+ *            new at this tick; else NULL
  *   busy:    the weak form's tick was long
  * Returns
  *   - PVID_WARMING_UP until there is an estimate of the weak form,

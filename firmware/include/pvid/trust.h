@@ -49,7 +49,7 @@ extern "C" {
 typedef struct {
     float kappa_min;  /* least kappa and least pivot of a published estimate, 0 <= . < 1. A single mode of motion gives
                          below 2e-5, by rounding */
-    float se_max;     /* largest relative standard error of the positive parameters, > 0 */
+    float se_max;     /* largest relative standard error of the positive parameters, without the shared errors, > 0 */
     float misfit_max; /* alarm when the residual variance exceeds its expectation by this factor, >= 1; 0: no alarm. The
                          factor is multiplied by 1 + 3 sqrt(2 / degrees of freedom) for all rows in the sums, by 1 for
                          the mean of PVID_TRUST_LONG groups or more, by 1.5 for the last PVID_TRUST_SHORT groups */

@@ -18,7 +18,7 @@ extern "C" {
 /* Settings; `pvid model build` computes them for a rig. See trust.h. */
 typedef struct {
     int32_t kappa_min;   /* least kappa and least pivot, Q30, 0..0.999 */
-    int32_t se_max;      /* largest standard error of the positive parameters, relative to them, Q24, > 0 */
+    int32_t se_max;      /* largest relative standard error of a positive parameter, without the shared, Q24, > 0 */
     uint32_t misfit_max; /* alarm when the residual variance exceeds its expectation by this factor, Q16, >= 1; 0: no
                             alarm */
     uint16_t groups_min; /* groups before the first publication */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "judge/publication.h"
+#include "judge/trust_f32.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "number/init.h"
@@ -823,6 +824,9 @@ PVID_COLD pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_ref
                                            const float shared[])
 {
     pvid_status status = pvid_init_is_given(self, config) ? pvid_refine_valid_f32(config, samples) : PVID_BAD_POINTER;
+    if ((status == PVID_OK) && !pvid_trust_shared_are_valid_f32(shared, PVID_REFINE_P)) {
+        status = PVID_BAD_SHARED;
+    }
     if (status == PVID_OK) {
         memset(self, 0, sizeof *self);
         self->config = *config;

@@ -81,7 +81,7 @@ void pvid_assess_invert_q31(const pvid_cholesky_q31 *factor, size_t a, pvid_inve
     }
     int32_t unit[PVID_MAX_P] = {0};
     int64_t square = 0;
-    unit[a] = (int32_t)1 << PVID_UNIT_BITS;
+    unit[a] = (int32_t)1 << (uint32_t)pvid_unit_bits_q31(factor->n);
     pvid_cholesky_lower_q31(factor, unit, inverse->column[a]);
     for (size_t i = 0; i < factor->n; i++) {
         square += pvid_square_q31(inverse->column[a][i]);
@@ -100,7 +100,8 @@ static int32_t part_of(int64_t x, int32_t a, int32_t b)
 
 int32_t pvid_assess_error_q31(const pvid_system_q31 *system, pvid_root_q31 own, size_t a, pvid_root_q31 wide)
 {
-    const int32_t shift = ((system->f[a] + system->g[a]) - (wide.e + own.e)) + 31 + PVID_UNIT_BITS;
+    const int32_t shift =
+        ((system->f[a] + system->g[a]) - (wide.e + own.e)) + 31 + pvid_unit_bits_q31(system->factor.n);
     return (int32_t)pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(wide.r, own.r), shift), INT32_MAX);
 }
 

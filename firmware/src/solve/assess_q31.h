@@ -10,8 +10,11 @@
 #include "solve/cholesky_q31.h"
 #include "solve/system_q31.h"
 
-/* Of the 1 whose column of U^-1 is computed. */
-#define PVID_UNIT_BITS (PVID_RHS_BITS - 1)
+/* Bits of the 1 whose column of U^-1 is computed. */
+static inline int32_t pvid_unit_bits_q31(uint32_t n)
+{
+    return pvid_rhs_bits_q31(n) - 1;
+}
 
 /* What the rows in the sums leave: sum of squares of the residuals, divided by 4^exponent, and the rows' weight, Q16.
  */
@@ -49,7 +52,7 @@ void pvid_assess_widen_q31(pvid_system_q31 *system, const pvid_solve_settings_q3
 void pvid_assess_invert_q31(const pvid_cholesky_q31 *factor, size_t a, pvid_inverse_q31 *inverse);
 
 /* Standard error of p[a], within INT32_MAX: wide times the root of the diagonal entry of (S + H)^-1, which is
- * 2^-(31 + PVID_UNIT_BITS + f_a + g_a) times own, the length of column a of U^-1. */
+ * 2^-(31 + pvid_unit_bits_q31(n) + f_a + g_a) times own, the length of column a of U^-1. */
 int32_t pvid_assess_error_q31(const pvid_system_q31 *system, pvid_root_q31 own, size_t a, pvid_root_q31 wide);
 
 /* Standard error of p[a] and its correlation with those before it, from wide^2 (S + H)^-1; start_sd and 0 iff the

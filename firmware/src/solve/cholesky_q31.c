@@ -90,7 +90,7 @@ void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[],
         for (size_t k = i + 1u; k < self->n; k++) {
             sum -= pvid_short_product_q31(self->u[i][k], x[k]);
         }
-        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_X_MAX);
+        x[i] = pvid_divide_q31(sum, self->inverse[i], pvid_x_max_q31(self->n));
     }
 }
 
@@ -101,7 +101,7 @@ static void solve_upper(const pvid_cholesky_q31 *self, const int32_t rhs[], int3
         for (size_t k = 0; k < i; k++) {
             sum -= pvid_short_product_q31(self->u[k][i], x[k]);
         }
-        x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_X_MAX);
+        x[i] = pvid_divide_q31(sum, self->inverse[i], pvid_x_max_q31(self->n));
     }
 }
 
@@ -110,12 +110,12 @@ int32_t pvid_cholesky_solve_q31(const pvid_cholesky_q31 *self, const int64_t rhs
     int32_t first[PVID_MAX_P];
     int32_t middle[PVID_MAX_P];
     int64_t wide[PVID_MAX_P];
-    const int32_t before = pvid_to_block_q31(self->n, rhs, PVID_RHS_BITS, first);
+    const int32_t before = pvid_to_block_q31(self->n, rhs, pvid_rhs_bits_q31(self->n), first);
     pvid_cholesky_lower_q31(self, first, middle);
     for (size_t i = 0; i < self->n; i++) {
         wide[i] = middle[i];
     }
-    const int32_t after = pvid_to_block_q31(self->n, wide, PVID_RHS_BITS, middle);
+    const int32_t after = pvid_to_block_q31(self->n, wide, pvid_rhs_bits_q31(self->n), middle);
     solve_upper(self, middle, x);
     return before + after;
 }

@@ -12,12 +12,25 @@
 /* A pivot below 2^-20 of its diagonal entry is rounding, not data. */
 #define PVID_PIVOT_SHIFT 20u
 
-/* Bits of a right-hand side: U^-1 makes it grow by 2^10 at most. */
-#define PVID_RHS_BITS 20
+/* Numbers of a system of more than 8 unknowns have a bit less: sums of n squares and of n - 1 products with 30 bits
+ * stay below 2^63. A model's bits depend on its own n, not on PVID_MAX_P. */
+static inline uint32_t pvid_spare_bits_q31(uint32_t n)
+{
+    return ((PVID_MAX_P > 8) && (n > 8u)) ? 1u : 0u;
+}
 
-/* Largest |x| of a solution and of a column of an inverse. Sums of n squares and of n - 1 products with 30 bits stay
- * below 2^63. */
-#define PVID_X_MAX ((PVID_MAX_P > 8) ? (PVID_ONE_Q30 / 2) : PVID_ONE_Q30)
+/* Bits of a right-hand side. */
+static inline int32_t pvid_rhs_bits_q31(uint32_t n)
+{
+    return 20 - (int32_t)pvid_spare_bits_q31(n);
+}
+
+/* Largest |x| of a solution and of a column of U^-1. A pivot is 2^-22 or more, so that an entry of 1 makes an x of 2^11
+ * at most where one pivot is small. */
+static inline int32_t pvid_x_max_q31(uint32_t n)
+{
+    return PVID_ONE_Q30 >> pvid_spare_bits_q31(n);
+}
 
 /* e such that diagonal 2^(-2 e) lies in [2^28, 2^30), for diagonal > 0; -15 for 0. */
 int32_t pvid_half_exponent_q31(int64_t diagonal);
@@ -40,7 +53,7 @@ int32_t pvid_cholesky_least_pivot_q31(const pvid_cholesky_q31 *self, const int32
  * 2^-PVID_PIVOT_SHIFT. */
 bool pvid_cholesky_factor_q31(pvid_cholesky_q31 *self, uint8_t n, const int32_t s[][PVID_MAX_P]);
 
-/* x[n] = U^-1 rhs, |rhs| < 2^PVID_RHS_BITS. */
+/* x[n] = U^-1 rhs, |rhs| < 2^pvid_rhs_bits_q31(n). */
 void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[], int32_t x[]);
 
 /* x[n] 2^(returned) = S^-1 rhs, |rhs| < INT64_MAX. */

@@ -14,7 +14,7 @@
 #define LEAST_SQUARE ((int32_t)1 << 18) /* of scores that need no smaller unit */
 #define SCORE_MAX ((int32_t)1 << DIGITS)
 #define MEAN_MAX (2 * SCORE_MAX * SCORE_MAX)
-#define Z_DOWN ((PVID_MAX_P > 8) ? 16 : 15) /* from a product of 29 bits to 14, so that sums of all pairs have 31 */
+#define Z_DOWN 15u /* from a product of 29 bits to 14, of more than 8 unknowns to 13: sums of all pairs have 31 */
 
 /* Far below: one part in so many of the mean. */
 #define FAR_BELOW 20
@@ -132,7 +132,7 @@ static int32_t scatter_of(const pvid_weak_scores_q31 *self, size_t n_p, const in
 }
 
 /* windows z^T G z is the variance of a row that would give p[a] the error of the scatter: z_b = L_b correlation_ab,
- * L_b^2 the diagonal of (S + H)^-1, is an integer within 2^14 times 2^unit. */
+ * L_b^2 the diagonal of (S + H)^-1, is an integer within 2^14 (of more than 8 unknowns 2^13) times 2^unit. */
 PVID_COLD void pvid_weak_scores_widen_q31(const pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
                                           const pvid_estimator_solve_q31 *assessment, uint32_t rows, size_t first,
                                           size_t last, pvid_estimate_q31 *estimate)
@@ -143,15 +143,17 @@ PVID_COLD void pvid_weak_scores_widen_q31(const pvid_weak_scores_q31 *self, cons
     int32_t exponent[PVID_MAX_P];
     uint32_t down[PVID_MAX_P];
     int32_t largest = INT16_MIN;
+    const uint32_t z_down = Z_DOWN + pvid_spare_bits_q31((uint32_t)n_p);
     for (size_t b = 0; b < n_p; b++) {
         exponent[b] = (root[b].e - (system->f[b] + system->g[b])) + self->unit[b];
         largest = (exponent[b] > largest) ? exponent[b] : largest;
     }
     for (size_t b = 0; b < n_p; b++) {
-        const int64_t below = pvid_clamp_q31((int64_t)largest - exponent[b], 31 - Z_DOWN);
-        down[b] = Z_DOWN + (uint32_t)((below > 0) ? below : 0);
+        const int64_t below = pvid_clamp_q31((int64_t)largest - exponent[b], 31 - (int32_t)z_down);
+        down[b] = z_down + (uint32_t)((below > 0) ? below : 0);
     }
-    const int32_t unit = (largest + Z_DOWN + 2) - (31 + PVID_UNIT_BITS); /* 2: a correlation has 30 bits, not 32 */
+    const int32_t bits = 31 + pvid_unit_bits_q31((uint32_t)n_p);
+    const int32_t unit = (largest + (int32_t)z_down + 2) - bits; /* 2: a correlation has 30 bits, not 32 */
     const int32_t of_square = ((2 * unit) + 32) - (4 * (int32_t)estimator->information.exponent) - WINDOWS_BITS;
     const uint64_t windows = pvid_quotient_q31((uint64_t)estimate->weight << WINDOWS_BITS, rows);
     const int32_t clamped = (int32_t)((windows < (uint64_t)INT32_MAX) ? windows : (uint64_t)INT32_MAX);
