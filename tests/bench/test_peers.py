@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.peers import compare
 from bench.peers.arm import JOINTS, standard_of, write_arm
 from bench.peers.compare import HEADER, TOOLS, fitted, interpreter, report, row, statements, tool_of
 from bench.peers.rigs import CLEAN, LACKING, OFF, RIGS
@@ -104,6 +105,16 @@ def test_a_tool_that_fails_is_a_row_with_the_reason(tmp_path: Path) -> None:
 def test_an_unknown_name_is_one_sentence(tool: list[str], mechanism: list[str], sentence: str) -> None:
     with pytest.raises(PvidError, match=sentence):
         report(1, 1, tool, mechanism, lambda: None)
+
+
+def test_a_tool_without_an_answer_in_time_is_a_row_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compare, "_PATIENCE", 1)
+    rig = RIGS["cart_pendulum"]
+    np.savez(tmp_path / "0.npz", **rig.recording(0, LACKING))  # type: ignore[arg-type]
+    found = fitted("scipy_simulation", rig.name, tmp_path, 0)  # takes 17 s
+    assert row(rig, LACKING, "scipy_simulation", *found)[3] == "not available: no answer within 1 s of the processor"
 
 
 def test_peers_do_not_need_the_product() -> None:

@@ -62,12 +62,13 @@ def test_an_estimate_is_valid_until_its_age(core: str, reading: float, period: i
     if core == "f32":
         config = replace(own.config, trust=replace(own.config.trust, age_max=8))
         record = replace(own, config=config).record(samples_of(config, run))
+        window = config.design.hop * config.design.decimation
     else:
         made = weak_q31_for_rig_like_the_shipped(own.simulation.model)
-        config = replace(made.config, trust=replace(made.config.trust, age_max=8))
-        record = weak_native_q31(made.made, made.parameters, config).identifier().run_samples(made.counts_of(run))
+        fixed = replace(made.config, trust=replace(made.config.trust, age_max=8))
+        record = weak_native_q31(made.made, made.parameters, fixed).identifier().run_samples(made.counts_of(run))
+        window = fixed.design.hop * fixed.design.decimation
     age, state = record.standing[first:] & 0xFFFF, standing.state_of(record)[first:]
-    window = config.design.hop * config.design.decimation
     passed, waits = len(age) / window, period / window  # windows; it grows at a reject or behind a window
     assert state[0] == Standing.VALID and passed - waits - 1 <= age[-1] - age[0] <= passed + 1 and passed > 12
     assert np.array_equal(state == Standing.DOUBTED, age > 8) and record.standing[-1] >> 24 == Doubt.AGED

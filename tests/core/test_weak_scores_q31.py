@@ -72,7 +72,7 @@ class Scores:
         """Standard errors of 0, widened."""
         assessment, estimate = core().pvid_estimator_solve_q31(), core().pvid_estimate_q31(weight=weight)
         for root, length in zip(assessment.part.inverse.root, LENGTHS.tolist(), strict=False):
-            root.r, root.e = 2**30, length + 1 + core().PVID_UNIT_BITS
+            root.r, root.e = 2**30, length + 1 + core().pvid_unit_bits_q31(N_P)
         size = int(len(estimate.correlation) ** 0.5)
         for a, row in enumerate(np.rint(CORRELATION * 2**30).astype(int).tolist()):
             estimate.correlation[a * size : a * size + N_P] = row

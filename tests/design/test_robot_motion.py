@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import re
 import subprocess
 from collections.abc import Callable
@@ -143,7 +144,8 @@ def test_the_command_writes_the_motion(tmp_path: Path, monkeypatch: pytest.Monke
         and "motion_excite[" in Path("motion.h").read_text()
     )
     told, _ = run("design --model arm.py --duration 6 -o motion.csv --json")
-    assert '"se": 0.0' in told and '"Fc1": {"value": 0.2' in told
+    friction = json.loads(told)["parameters"]["Fc1"]
+    assert friction == {"value": 0.2, "se": pytest.approx(0.0090, rel=0.05), "unit": "N*m"}  # of the motion found
     assert "the motion of a robot needs its length and a file" in run("design --model arm.py")[0]
     assert "dc_motor is no robot, whose motion --out writes" in run("design --model dc_motor -o x.csv")[0]
 

@@ -43,8 +43,8 @@ typedef enum {
 } pvid_doubt;
 
 typedef struct {
-    uint16_t age;   /* windows since the publication, whether they counted or not, or were cut by rejected samples and gaps,
-                       whose ticks count; stops at 65535 */
+    uint16_t age;   /* windows since the publication, whether they counted or not; where rejected samples and gaps cut
+                       them, as many as their ticks make; stops at 65535 */
     uint8_t state;  /* pvid_standing_state */
     uint8_t causes; /* of pvid_doubt, while it is doubted or withdrawn; 0: none */
 } pvid_standing;

@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.peers.rigs import NONE, Fit, Rig, Run, Values, derivatives, runge_kutta
 
-PACKAGE = "casadi scipy"
+PACKAGE = "casadi==3.8.2 scipy==1.17.1"
 RIGS = ("dc_motor", "free_pendulum", "cart_pendulum", "cell")
 STEPS = 25
 

@@ -1,7 +1,7 @@
 """The table of `bench peers`: recordings of every mechanism, each tool on them in a process of its environment.
 
-The tools of others are installed by name into build/peers, an environment of their own; one that cannot be had has a
-row with the reason.
+The tools of others are installed into build/peers, an environment of their own, in the versions that their files name;
+one that cannot be had, or has no answer in time, has a row with the reason.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import ast
 import inspect
 import json
 import os
+import signal
 import statistics
 import subprocess
 import sys
@@ -45,6 +46,7 @@ TOOLS = {
 }
 _ENVIRONMENT = ROOT / "build" / "peers"
 _LARGEST = 1000.0  # per cent, standard errors
+_PATIENCE = 120  # seconds of the processor that a tool has for a recording, beside those for all
 
 
 def tool_of(name: str) -> ModuleType:
@@ -76,10 +78,13 @@ def fitted(name: str, rig: str, folder: Path, seconds: float) -> tuple[list[dict
     python, why = interpreter(tool_of(name).PACKAGE)
     if why:
         return [], why
-    command = [python, "-P", "-m", "bench.peers.worker", name, rig, str(folder), str(seconds)]
+    most = int(seconds) + _PATIENCE
+    command = [python, "-P", "-m", "bench.peers.worker", name, rig, str(folder), str(seconds), str(most)]
     one_thread = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     told = subprocess.run(command, capture_output=True, text=True, check=False, env=one_thread)
     found = [json.loads(line) for line in told.stdout.splitlines() if line.startswith("{")]
+    if told.returncode == -signal.SIGXCPU:
+        return found, "" if found else f"no answer within {most} s of the processor"
     return found, "" if found else (told.stderr.strip().splitlines() or ["no answer"])[-1]
 
 

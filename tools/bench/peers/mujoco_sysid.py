@@ -14,7 +14,7 @@ import numpy as np
 from bench.peers.arm import BODIES, JOINTS, mjcf, standard_of
 from bench.peers.rigs import GRAVITY, Fit, Float, Run, derivatives
 
-PACKAGE = "mujoco[sysid]"
+PACKAGE = "mujoco[sysid]==4.0.0"
 RIGS = ("free_pendulum", "cart_pendulum", "arm3")
 CHUNK = 0.5
 HEAD = (

@@ -14,7 +14,7 @@ import numpy as np
 from bench.peers.arm import JOINTS, RATE, mjcf
 from bench.peers.rigs import Fit, Float, Run
 
-PACKAGE = "pin scipy"
+PACKAGE = "pin==4.1.0 scipy==1.17.1"
 RIGS = ("arm3",)
 CUT, EVERY = 10.0, 5  # of the filter [Hz]; rows that are kept
 ORDER = (0, 1, 2, 3, 4, 5, 7, 6, 8, 9)  # places of Pinocchio's m, h, Ixx, Ixy, Iyy, Ixz, Iyz, Izz

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bench.peers.rigs import NONE, Fit, Rig, Run, Values
 
-PACKAGE = "pybop"
+PACKAGE = "pybop==26.3"
 RIGS = ("cell",)
 
 

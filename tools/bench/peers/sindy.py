@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.peers.rigs import NONE, Fit, Float, Rig, Run, Values, centred, derivatives
 
-PACKAGE = "pysindy"
+PACKAGE = "pysindy==2.1.0"
 RIGS = ("dc_motor", "free_pendulum")
 
 

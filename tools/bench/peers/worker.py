@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import logging
+import resource
 import sys
 import time
 import warnings
@@ -16,8 +17,9 @@ from bench.peers.arm import arm_rig
 from bench.peers.rigs import RIGS
 
 
-def main(tool: str, rig: str, folder: Path, seconds: float) -> None:
-    """Fits until the processor's seconds are used up."""
+def main(tool: str, rig: str, folder: Path, seconds: float, most: int) -> None:
+    """Fits until the processor's seconds are used up; killed by the system at `most`."""
+    resource.setrlimit(resource.RLIMIT_CPU, (most, most + 1))
     logging.disable()
     warnings.simplefilter("ignore")
     peer = importlib.import_module(f"bench.peers.{tool}")
@@ -40,4 +42,4 @@ def main(tool: str, rig: str, folder: Path, seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], Path(sys.argv[3]), float(sys.argv[4]))
+    main(sys.argv[1], sys.argv[2], Path(sys.argv[3]), float(sys.argv[4]), int(sys.argv[5]))
