@@ -82,6 +82,7 @@ def test_the_search_follows_the_derivative() -> None:
 
 def test_the_c_moves_as_the_table(motion: Motion, tmp_path: Path) -> None:
     (tmp_path / "motion.h").write_text(motion_header(motion, "motion", "pvid design"))
+    assert "#define MOTION_2__JOINTS 2\n" in motion_header(motion, "2\u00fc", "pvid design")  # any name of a file
     (tmp_path / "run.c").write_text(
         '#include "motion.h"\nint run(int joint, float *out, int ticks)\n{\n    static pvid_excite_f32 self;\n'
         "    const int status = (int)pvid_excite_init_f32(&self, &motion_excite[joint]);\n"
@@ -110,9 +111,15 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "noise": (lambda: simple_drives(model_of(torque=None), 5.0), "j0 has neither a limit nor a noise of its torque"),
     "range": (lambda: simple_drives(model_of(limits=None, prismatic=True), 5.0), "j0 has no limits"),
     "inertial": (lambda: simple_drives(model_of(inertial=None), 5.0), "a limit of a torque needs the inertias"),
-    "weak": (lambda: simple_drives(model_of(torque=0.9), 5.0), "no pose that was tried keeps the box and holds"),
-    "box": (lambda: simple_drives(model_of(box=((5, 5, 5), (6, 6, 6))), 5.0), "no pose that was tried keeps the box"),
-    "short": (lambda: simple_drives(model_of(), 1.0), "a motion of 1 s is too short: --duration 2 or more"),
+    "weak": (lambda: simple_drives(model_of(torque=0.9), 5.0), "within its limits: j1 needs 111% of its torque"),
+    "box": (lambda: simple_drives(model_of(box=((5, 5, 5), (6, 6, 6))), 5.0), "a point is outside the box"),
+    "short": (lambda: simple_drives(model_of(), 1.0), "a motion of 1 s: --duration must be from 2.4 to 600"),
+    "long": (lambda: simple_drives(model_of(), 3600.0), "a motion of 3600 s: --duration must be from 2.4 to 600"),
+    "slow": (lambda: simple_drives(model_of(), 5.0, 20.0), "20 samples a second are too few for a robot"),
+    "empty box": (
+        lambda: simple_drives(model_of(1, torque=None, noise=0.1, inertial=None), 5.0),
+        "the box holds nothing",
+    ),
 }
 
 
@@ -145,9 +152,13 @@ def test_the_command_writes_the_motion(tmp_path: Path, monkeypatch: pytest.Monke
     )
     told, _ = run("design --model arm.py --duration 6 -o motion.csv --json")
     friction = json.loads(told)["parameters"]["Fc1"]
-    assert friction == {"value": 0.2, "se": pytest.approx(0.0090, rel=0.05), "unit": "N*m"}  # of the motion found
+    assert friction == {"file": 0.2, "se": pytest.approx(0.0090, rel=0.05), "unit": "N*m"}  # of the motion found
     assert "the motion of a robot needs its length and a file" in run("design --model arm.py")[0]
     assert "dc_motor is no robot, whose motion --out writes" in run("design --model dc_motor -o x.csv")[0]
+    assert "omit --run, --tone and --on" in run("design --model arm.py --duration 6 -o motion.csv --tone 1,1,0")[0]
+    assert "name the table, motion.csv" in run("design --model arm.py --duration 6 -o motion.h")[0]
+    Path("2.h").write_text("mine")
+    assert "2.h is not replaced" in run("design --model arm.py --duration 6 -o 2.csv")[0] and not Path("2.csv").exists()
 
 
 def test_the_bench_counts_what_is_beyond_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,8 +41,8 @@ BALL = '<mujoco><worldbody><body><joint name="b" type="ball"/><geom size="0.1"/>
 STILL = '<mujoco><worldbody><body><geom size="0.1"/></body></worldbody></mujoco>'
 SPRING = '<mujoco><worldbody><body><joint name="s" stiffness="2"/><geom size="0.1"/></body></worldbody></mujoco>'
 SMALL = '<mujoco><worldbody><body><joint axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/></body></worldbody></mujoco>'
-ONE = '<body><joint/><geom size="0.1"/>'
-MANY = f"<mujoco><worldbody>{ONE * 13}{'</body>' * 13}</worldbody></mujoco>"
+ONE = '<body><joint name="j{}"/><geom size="0.1"/>'
+MANY = f"<mujoco><worldbody>{''.join(map(ONE.format, range(13)))}{'</body>' * 13}</worldbody></mujoco>"
 COUPLED = '<equality><joint joint1="slide" joint2="other"/></equality>'
 LOOP = '<equality><connect body1="{}" body2="{}" anchor="0 0 0"/></equality>'
 
@@ -90,6 +90,32 @@ def test_the_model_file_is_short(tmp_path: Path) -> None:
     assert len(text.splitlines()) < 12 and max(map(len, text.splitlines())) <= 200
 
 
+@pytest.mark.parametrize(
+    ("inertial", "told"),
+    [
+        ("", "without an inertial, taken as 0: lower"),
+        (LOWER.replace('ixx="', 'ixx="9'), "with an impossible inertia, the nearest is taken: lower"),
+        ('<inertial><mass value="1"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>', ""),
+    ],
+    ids=["none", "impossible", "of a point"],
+)
+def test_base_parameters_need_no_inertia_of_the_file(inertial: str, told: str, tmp_path: Path) -> None:
+    usual, found = chain_of(tmp_path, URDF), chain_of(tmp_path, URDF.replace(LOWER, inertial))
+    assert [*map(found.name_of, found.base)] == [*map(usual.name_of, usual.base)]
+    notes = [one for one in (tmp_path / "robot.py").read_text().splitlines() if one.startswith("#")]
+    assert notes == ([f"# {told}"] if told else [])
+    mass = found.joints[1].inertial
+    assert mass is not None and mass[0] == (1.4 if inertial else 0.4)  # with the tool
+
+
+def test_a_transmission_hides_no_limit_and_an_endless_speed_is_none(tmp_path: Path) -> None:
+    more = '<transmission name="t"><joint name="shoulder"/></transmission></robot>'
+    joints = chain_of(tmp_path, URDF.replace("</robot>", more).replace('velocity="4"', 'velocity="inf"')).joints
+    assert [one.speed for one in joints] == [3.0, None]
+    endless = MJCF.replace('name="tilt"', 'name="tilt" actuatorfrclimited="true" actuatorfrcrange="0 5"')
+    assert chain_of(tmp_path, endless.format(more="")).joints[1].torque is None
+
+
 REFUSED = {
     "no file": (None, (), "cannot be read"),
     "no XML": ("t,q1\n0,1\n", (), "is no URDF or MJCF file"),
@@ -98,8 +124,7 @@ REFUSED = {
     "ball": (BALL, (), "b is a ball joint"),
     "no joint": (STILL, (), "no joint moves"),
     "spring": (SPRING, (), "s has a spring (stiffness)"),
-    "many": (MANY, (), "13 joints are more than 12: choose some with --joints"),
-    "no inertial": (URDF.replace(LOWER, ""), (), "lower moves and has no inertial"),
+    "many": (MANY, (), "13 joints are more than 12: choose some of them with --joints: j0,j1,"),
     "no such joint": (MJCF.format(more=""), ("knee",), "there is no joint knee: it has turn, tilt, slide and other"),
     "order": (MJCF.format(more=""), ("slide", "turn"), "turn carries a joint before it in the list"),
     "loop": (
@@ -107,7 +132,7 @@ REFUSED = {
         .format(more=LOOP.format("a", "b")), (), "an equality ties its bodies (a closed loop, or coupled joints)",
     ),
     "coupled": (
-        MJCF.format(more=COUPLED), (), "an equality ties its bodies",
+        MJCF.format(more=COUPLED), (), "are identified; hold slide and other: --joints turn,tilt",
     ),
 }  # fmt: skip
 

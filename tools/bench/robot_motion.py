@@ -130,7 +130,7 @@ def drawn(seed: int) -> tuple[CompiledModel, float]:
         )  # fmt: skip
     low = np.array([*-(10 ** random.uniform(-0.5, 0.3, 2)), random.uniform(-0.5, 0.2)])
     box = (tuple(low), tuple(low + 10 ** random.uniform(0, 0.5, 3))) if random.integers(4) else None
-    return compiled(joints, box), float(random.uniform(2, 4))
+    return compiled(joints, box), float(random.uniform(2.5, 4))
 
 
 def verdict(seed: int, turns: int) -> dict[str, float] | None:

@@ -89,8 +89,8 @@ def command(
     if model in names() and not (rig_path or settings or run_path or drive or duration or out):
         return print_design(compiled_of(model), None, asked, as_json=as_json)
     rig = rig_of(run_path, rig_path, settings, model, columns)
-    if out is not None or (run_path is None and not drive and asked is None and rig.compiled().chain is not None):
-        return print_motion(rig, duration, out, as_json=as_json)
+    if out is not None or rig.compiled().chain is not None:
+        return print_motion(rig, duration, out, other=bool(run_path or drive or asked), as_json=as_json)
     if run_path is not None:
         recording, compiled = recording_of(run_path, rig, columns)
         return print_design(compiled, recording, asked, as_json=as_json)

@@ -16,6 +16,7 @@ from rich.table import Table
 from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, working, write_stderr
 from pvid.base.errors import PvidError
+from pvid.base.replacing import refuse_foreign
 from pvid.base.rounding import with_error
 from pvid.base.wording import listed
 from pvid.configuration.design_report import DesignReport, designs_tried, report_for_recording, report_for_rig
@@ -60,8 +61,12 @@ def print_design(
     return DONE if report.chosen.known else NOTHING_IDENTIFIED
 
 
-def print_motion(rig: MechanismRig, duration: float | None, out: Path | None, *, as_json: bool) -> int:
+def print_motion(rig: MechanismRig, duration: float | None, out: Path | None, *, other: bool, as_json: bool) -> int:
     """Designs a motion of a robot, prints the errors that it gives, and writes it as CSV and C.
+
+    Parameters
+    ----------
+    other : a recording, a drive or a board was named too, which is refused
 
     Returns
     -------
@@ -73,24 +78,30 @@ def print_motion(rig: MechanismRig, duration: float | None, out: Path | None, *,
     model = rig.compiled()
     if model.chain is None:
         raise PvidError(f"{model.name} is no robot, whose motion --out writes: omit it")
+    if other:
+        raise PvidError("`design` makes a robot's motion itself: omit --run, --tone and --on")
     if out is None or duration is None:
         raise PvidError("the motion of a robot needs its length and a file to write: --duration 20 -o motion.csv")
+    header = out.with_suffix(".h")
+    if header == out:
+        raise PvidError(f"{out} is the name of the motion in C: name the table, {out.with_suffix('.csv').name}")
+    refuse_foreign(header)
     with working("designing a motion"):
         motion = designed_motion(model, duration, rig.sample_rate or 1000.0)
         fit = motion.predicted()
-    header = out.with_suffix(".h")
     command = f"pvid design --model {model.name}.py --duration {duration:g} -o {out.name}"
     write_whole(out, motion_table(motion))
     write_whole(header, motion_header(motion, out.stem, command))
     errors = np.sqrt(np.diag(fit.covariance))
     used = {name: one for name, one in motion.used.items() if one is not None}
+    end = NOTHING_IDENTIFIED if fit.undetermined.all() else DONE
     if as_json:
         listing = {
-            one.name: {"value": one.guess, "se": None if lost else float(error), "unit": one.unit}
+            one.name: {"file": one.guess, "se": None if lost else float(error), "unit": one.unit}
             for one, error, lost in zip(model.unknowns, errors, fit.undetermined, strict=True)
         }
         click.echo(json.dumps({"parameters": listing, "used": used, "gain": motion.gain, "duration_s": duration}))
-        return DONE
+        return end
     table = Table("parameter", "in the file", "standard error", title=f"a motion of {duration:g} s")
     for one, error, lost in zip(model.unknowns, errors, fit.undetermined, strict=True):
         shown = ("", "not determined") if lost else with_error(one.guess, float(error))
@@ -100,7 +111,7 @@ def print_motion(rig: MechanismRig, duration: float | None, out: Path | None, *,
     parts = [f"{100 * one:.0f} % of the {name}" for name, one in used.items() if name != "box"]
     click.echo(f"largest use of a limit: {listed(parts)}" + ("; within the box" if "box" in used else ""))
     click.echo(f"{out}, {header}: {model.title}, {len(model.chain.joints)} joints, {motion.rate:g} ticks a second")
-    return DONE
+    return end
 
 
 def _measured(asked: Asked, model: CompiledModel, recording: Recording | None) -> list[Cost]:

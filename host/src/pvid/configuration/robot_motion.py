@@ -24,13 +24,13 @@ from pvid.base.errors import PvidError
 from pvid.model.chain import Chain, Joint, friction
 from pvid.model.compiled import CompiledModel
 from pvid.model.operations import differentiated, evaluated
-from pvid.oracle.weak.robot import RobotFit, identify_robot
+from pvid.oracle.weak.robot import RobotFit, identify_robot, shortest_run
 
 Float = npt.NDArray[np.float64]
 
 TONES = 8
 _RAMP_S, _RAMP = 1.0, 0.1  # longest, and part of the duration
-_SHORTEST_S = 2.0
+_LONGEST_S = 600.0
 _TINY = 1e-30  # complex step
 _PER_PERIOD, _FEWEST = 10, 200  # steps of the search's grid, in the shortest period, and in all
 _FINE = 2e-3  # step of the grid on which limits are checked, at most [s]
@@ -162,6 +162,8 @@ class Task:
             raise PvidError("a limit of a torque needs the inertias of all bodies: give each joint its inertial")
         self.dry = np.array([(one.friction or (0.0, 0.0))[1] for one in chain.joints])
         self.places = None if chain.box is None else chain.places()
+        if self.places is not None and not self.places.results:
+            raise PvidError("the box holds nothing: no joint has points, or a centre of mass by its inertial")
         if noise is None:
             noise = np.array([one.noise or _NOISE * (one.torque or 0.0) for one in chain.joints])
             if not noise.all():
@@ -280,18 +282,18 @@ class Task:
         middle, random = (self.high + self.low) / 2, np.random.default_rng(0)
         poses = [middle, *random.uniform(self.low, self.high, (_POSES, self.n))]
         q = np.array(poses).T
-        bad = np.full(len(poses), -math.inf)
-        if np.isfinite(self.most).any():
-            still = np.concatenate(list(self.torques(q, 0 * q, 0 * q)), axis=1)
-            bad = np.max((np.abs(still) + self.dry[:, np.newaxis]) / self.most[:, np.newaxis], axis=0) - 1
+        still = np.concatenate(list(self.torques(q, 0 * q, 0 * q)), axis=1)
+        parts = (np.abs(still) + self.dry[:, np.newaxis]) / self.most[:, np.newaxis]
+        bad = np.max(parts, axis=0) - 1
         if self.places is not None:
             points = np.array([np.broadcast_to(one, q.shape[1:]) for one in evaluated(self.places, q)])
             bad = np.maximum(bad, self.outside(points).max(axis=0) / _BOX)
         best = int(np.argmin(bad)) if bad[0] > -0.5 else 0
         if bad[best] >= 0:
-            raise PvidError(
-                "no pose that was tried keeps the box and holds the robot within its torques: widen one of them"
-            )
+            worst = int(np.argmax(parts[:, best]))
+            why = f"{self.chain.joints[worst].name} needs {parts[worst, best]:.0%} of its torque" if parts[
+                worst, best] >= 1 else "a point is outside the box"  # fmt: skip
+            raise PvidError(f"no pose that was tried holds the robot still within its limits: {why}")
         return np.asarray(poses[best])
 
     # ---- information
@@ -398,8 +400,9 @@ def _reach(joint: Joint) -> tuple[float, float, float]:
 
 def simple_drives(model: CompiledModel, duration: float, rate: float = 1000.0) -> list[tuple[Task, Series]]:
     """Multisines of equal amplitudes with Schroeder's phases in three bands, as large as the limits let them be."""
-    if duration < _SHORTEST_S or not math.isfinite(duration):
-        raise PvidError(f"a motion of {duration:g} s is too short: --duration {_SHORTEST_S:g} or more")
+    shortest = math.ceil(10 * shortest_run(rate)) / 10
+    if not shortest <= duration <= _LONGEST_S:
+        raise PvidError(f"a motion of {duration:g} s: --duration must be from {shortest:g} to {_LONGEST_S:g}")
     ramp, duration = (round(one * rate) / rate for one in (min(_RAMP_S, _RAMP * duration), duration))
     burst, n = duration - 2 * ramp, len(_chain_of(model).joints)
     series = Series(np.zeros(n), np.zeros((n, 2 * TONES)), np.ones(TONES), duration, ramp)

@@ -28,7 +28,8 @@ def motion_table(motion: Motion) -> str:
 def motion_header(motion: Motion, name: str, command: str) -> str:
     """C99: centres and an excitation of each joint."""
     series, joints = motion.series, motion.chain.joints
-    name = re.sub(r"\W", "_", name)
+    name = re.sub(r"\W", "_", name, flags=re.ASCII)
+    name = name if name[:1].isalpha() else f"motion_{name}"
     sizes, cosines = np.split(series.waves, 2, axis=1)
     _, (q, v, _) = series.samples(motion.rate)
     times = (motion.rate, series.ramp_s, series.duration - 2 * series.ramp_s)

@@ -94,12 +94,15 @@ class Robot(Model):
         given = None if inertial is None else tuple(float(one) for one in inertial)
         if given is not None and (len(given) != len(INERTIAL) or not np.isfinite(given).all()):
             raise self._refused(f"{name}: inertial has {len(INERTIAL)} numbers: {', '.join(INERTIAL)}")
-        for what, value in {"speed": speed, "torque": torque, "noise": noise}.items():
-            if value is not None and not 0 < float(value) < math.inf:
-                raise self._refused(f"{name}: {what} must be above 0, not {value}")
+        speed, torque, noise = (
+            self._positive(f"{name}: {what}", value)
+            for what, value in (("speed", speed), ("torque", torque), ("noise", noise))
+        )
         reach, rubbed = self._two(f"{name}: limits", limits), self._two(f"{name}: friction", friction)
         if reach is not None and reach[0] >= reach[1]:
             raise self._refused(f"{name}: limits are the lowest and the highest position, not {limits}")
+        if rubbed is not None and min(rubbed) < 0:
+            raise self._refused(f"{name}: friction is not negative, as {friction} is")
         if resolution is None:
             resolution = _SCALE if prismatic else _ENCODER
         self.sensor(f"q{number}", "m" if prismatic else "rad", resolution=resolution, reach=math.pi, gain_sd=0.0)
@@ -148,9 +151,24 @@ class Robot(Model):
     def _two(self, what: str, given: Sequence[float] | None) -> tuple[float, float] | None:
         if given is None:
             return None
-        if len(given) != 2 or not math.isfinite(sum(map(float, given))):
-            raise self._refused(f"{what} has two numbers, not {given}")
-        return float(given[0]), float(given[1])
+        try:
+            one, other = (float(each) for each in given)
+        except (TypeError, ValueError):
+            one = other = math.nan
+        if not (math.isfinite(one) and math.isfinite(other)):
+            raise self._refused(f"{what}: two finite numbers are needed, not {given}")
+        return one, other
+
+    def _positive(self, what: str, given: float | None) -> float | None:
+        if given is None:
+            return None
+        try:
+            value = float(given)
+        except (TypeError, ValueError):
+            value = math.nan
+        if not 0 < value < math.inf:
+            raise self._refused(f"{what} must be a number above 0, not {given}")
+        return value
 
     def _three(self, what: str, given: Sequence[float]) -> tuple[float, float, float]:
         try:

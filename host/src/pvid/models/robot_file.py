@@ -20,8 +20,10 @@ from pvid.model.robot import MOST_JOINTS
 Float = npt.NDArray[np.float64]
 _ROUNDED = 10  # digits behind the point
 _TWELFTHS = 1e-9  # of pi: an angle that is as close to a twelfth of a half turn is that
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_LEAST_SECOND, _ROUGH = 1e-12, 1e-6  # [kg*m^2]; of the largest second moment
 _LOCKED = 1e-6  # cosine of the pitch below which roll and yaw turn about one axis
-_TOP, _LEAST_MASS = 80, 1e-9
+_LEAST_MASS = 1e-11  # [kg]
 
 
 def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
@@ -35,7 +37,7 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
     chosen : names of the joints that move and are recorded, in the order of the columns; others are held at their zero;
         (): all
     """
-    mujoco, model, speeds = _read(path)
+    mujoco, model, speeds, notes = _read(path)
     joints = _chosen(mujoco, model, path, chosen)
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr] = 0.0
@@ -47,6 +49,7 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
         "",
         "from pvid.model import Robot, pi",
         "",
+        *(f"# {one}" for one in notes),
         f"model = Robot({json.dumps(printable(path.stem))}, gravity={_numbers(model.opt.gravity)})",
     ]
     frames: dict[int, tuple[Float, Float]] = {-1: (np.zeros(3), np.eye(3))}
@@ -77,8 +80,8 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
             given["limits"] = _numbers(model.jnt_range[joint])
         if speeds.get(name, 0) > 0:
             given["speed"] = _number(speeds[name])
-        if model.jnt_actfrclimited[joint]:
-            given["torque"] = _number(min(abs(model.jnt_actfrcrange[joint])))
+        if model.jnt_actfrclimited[joint] and (most := min(abs(model.jnt_actfrcrange[joint]))) > 0:
+            given["torque"] = _number(most)
         own = [k for k in range(1, model.nbody) if carrier[k] == place]
         given["inertial"] = _numbers(_inertial(model, data, own, *frames[place]))
         names.append(name)
@@ -88,8 +91,9 @@ def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
     return "\n".join([*lines, ""])
 
 
-def _read(path: Path) -> tuple[Any, Any, dict[str, float]]:
-    """MuJoCo, its model of a file, and the speeds that URDF allows; what is only drawn is not needed of URDF."""
+def _read(path: Path) -> tuple[Any, Any, dict[str, float], list[str]]:
+    """MuJoCo, its model of a file, the speeds that URDF allows, and what was changed; what is only drawn is not needed
+    of URDF."""
     try:
         import mujoco
     except ImportError:
@@ -101,21 +105,57 @@ def _read(path: Path) -> tuple[Any, Any, dict[str, float]]:
             for link in tree.iter("link"):
                 for one in [*link.findall("visual"), *link.findall("collision")]:
                     link.remove(one)
-            lost = [one.get("name", "") for one in tree.iter("link") if one.find("inertial") is None]
-            moved = {one.find("child").get("link", "") for one in tree.iter("joint")  # type: ignore[union-attr]
+            moved = {one.find("child").get("link", "") for one in tree.findall("joint")  # type: ignore[union-attr]
                      if one.get("type") != "fixed" and one.find("child") is not None}  # fmt: skip
-            if bare := [one for one in lost if one in moved]:
-                raise PvidError(f"{path}: {listed(map(printable, bare))} moves and has no inertial: add it to the file")
-            limits = {one.get("name", ""): one.find("limit") for one in tree.iter("joint")}
+            bare = [one for one in tree.iter("link") if one.find("inertial") is None and one.get("name") in moved]
+            changed = [one for one in tree.iter("link") if one.find("inertial") is not None and _made_possible(one)]
+            for one in bare:
+                ElementTree.SubElement(one, "inertial")
+                _made_possible(one)
+            kinds = {
+                "without an inertial, taken as 0": bare,
+                "with an impossible inertia, the nearest is taken": changed,
+            }
+            notes = [f"{what}: {', '.join(printable(one.get('name', '')) for one in some)}"
+                     for what, some in kinds.items() if some]  # fmt: skip
+            limits = {one.get("name", ""): one.find("limit") for one in tree.findall("joint")}
             speeds = {name: float(one.get("velocity", 0)) for name, one in limits.items() if one is not None}
-            return mujoco, mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode")), speeds
-        return mujoco, mujoco.MjModel.from_xml_path(str(path)), {}
+            model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
+            return mujoco, model, {name: one for name, one in speeds.items() if math.isfinite(one)}, notes
+        return mujoco, mujoco.MjModel.from_xml_path(str(path)), {}, []
     except OSError as error:
         raise PvidError(f"{path}: cannot be read: {error.strerror}") from None
     except (ElementTree.ParseError, UnicodeDecodeError) as error:
         raise PvidError(f"{path}: is no URDF or MJCF file: {reason(error)}") from None
     except ValueError as error:
         raise PvidError(f"{path}: MuJoCo does not read it: {printable(reason(error))}") from None
+
+
+def _made_possible(link: ElementTree.Element) -> bool:
+    """Whether no body has the mass and the inertia of a link: the nearest that one has are taken.
+
+    MuJoCo's bodies have no 0 in them: a point, a rod and a massless link become a little larger.
+    """
+    inertial = link.find("inertial")
+    assert inertial is not None
+    mass, about = (ElementTree.SubElement(inertial, name) if (found := inertial.find(name)) is None else found
+                   for name in ("mass", "inertia"))  # fmt: skip
+    i = np.zeros((3, 3))
+    i[np.triu_indices(3)] = [float(about.get(name, 0)) for name in _MOMENTS]
+    i += np.triu(i, 1).T
+    # Second moments about the centre, which no body has below 0.
+    sizes, axes = np.linalg.eigh(np.trace(i) / 2 * np.eye(3) - i)
+    least = max(_LEAST_SECOND, _ROUGH * float(sizes[-1]))
+    heavy = float(mass.get("value", 0))
+    impossible = heavy < 0 or sizes[0] < -_ROUGH * np.abs(sizes).max()
+    if heavy > _LEAST_MASS and sizes[0] >= least:
+        return False
+    second = (axes * np.maximum(sizes, least)) @ axes.T
+    i = np.trace(second) * np.eye(3) - second
+    mass.set("value", repr(max(heavy, _LEAST_MASS)))
+    for name, one in zip(_MOMENTS, i[np.triu_indices(3)], strict=True):
+        about.set(name, repr(float(one)))
+    return bool(impossible)
 
 
 def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[int]:
@@ -138,7 +178,10 @@ def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[
         if any(_is_under(model, one, joint) for one in joints[:place]):
             raise PvidError(f"{path}: {printable(names[joint])} carries a joint before it in the list: name it first")
     if len(joints) > MOST_JOINTS:
-        raise PvidError(f"{path}: {len(joints)} joints are more than {MOST_JOINTS}: choose some with --joints")
+        raise PvidError(
+            f"{path}: {len(joints)} joints are more than {MOST_JOINTS}: choose some of them with --joints: "
+            f"{','.join(map(printable, names))}"
+        )
     for one in joints:
         if model.jnt_stiffness[one] > 0:
             raise PvidError(
@@ -172,15 +215,18 @@ def _refuse_loops(mujoco: Any, model: Any, carrier: Sequence[int], path: Path) -
     kinds = mujoco.mjtEq
     for k in range(model.neq):
         kind, one, other = model.eq_type[k], int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-        bodies = [one, other]
+        bodies, tied = [one, other], ""
         if kind == kinds.mjEQ_JOINT:
+            both = [model.joint(at).name for at in bodies if at >= 0]
+            free = [name for name in map(lambda at: model.joint(at).name, range(model.njnt)) if name not in both]
+            tied = f"; hold {listed(map(printable, both))}: --joints {','.join(map(printable, free))}"
             bodies = [int(model.jnt_bodyid[at]) for at in bodies if at >= 0]
         elif kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or model.eq_objtype[k] != mujoco.mjtObj.mjOBJ_BODY:
             bodies = [0, model.nbody - 1]
         if len({carrier[at] for at in bodies} | ({-2} if len(bodies) < 2 else set())) > 1:
             raise PvidError(
                 f"{path}: an equality ties its bodies (a closed loop, or coupled joints): only trees of free joints "
-                "are identified; hold coupled ones with --joints"
+                f"are identified{tied}"
             )
 
 

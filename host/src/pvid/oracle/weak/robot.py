@@ -63,6 +63,16 @@ LAWS: Mapping[str, Callable[[Float, Float], Float]] = {  # of positions and rate
 }
 
 
+def shortest_run(sample_rate: float) -> float:
+    """Length of the shortest recording that is identified [s].
+
+    Raises PvidError where the rate [Hz] is too low.
+    """
+    if sample_rate < _LEAST_HZ:
+        raise PvidError(f"{sample_rate:g} samples a second are too few for a robot: {_LEAST_HZ:g} or more")
+    return (_FEWEST_WINDOWS + 1) * _SHORTEST_S / 2 + _LONGEST / sample_rate
+
+
 @dataclass(frozen=True)
 class RobotDesign:
     """Of the windows of a run.
@@ -108,6 +118,7 @@ class RobotRun:
     def design(self) -> RobotDesign:
         """The longest polynomials that blur nothing visible, and windows for the band of the motion."""
         rate = self.sample_rate
+        shortest_run(rate)
         parts = [one for one in self.positions if one.shape[1] > 2 * _LONGEST]
         if not parts:
             raise PvidError(f"the run has no {2 * _LONGEST} samples without a gap: record longer")
@@ -137,8 +148,6 @@ class RobotRun:
         hop = int(min(max(samples / rate / _WINDOWS, _SHORTEST_S), _LONGEST_S) * rate / 2)
         wanted = 2 * int(np.ceil(highest * 2 * hop / rate)) + 1
         count = min(max(wanted, _FEWEST), _MOST, 2 * (hop // 2 - _POWER) - 1)
-        if rate < _LEAST_HZ:
-            raise PvidError(f"{rate:g} samples a second are too few for a robot: record at {_LEAST_HZ:g} Hz or more")
         return RobotDesign(rate, taps, TestFunctions(count, _POWER, hop, 1 / rate), sd, still)
 
     def smoothed(self, q: Float, taps: int, order: int) -> Float:
