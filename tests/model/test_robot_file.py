@@ -125,6 +125,7 @@ REFUSED = {
     "no joint": (STILL, (), "no joint moves"),
     "spring": (SPRING, (), "s has a spring (stiffness)"),
     "many": (MANY, (), "13 joints are more than 12: choose some of them with --joints: j0,j1,"),
+    "no number": (URDF.replace('velocity="4"', 'velocity="fast"'), (), "is no URDF file: could not convert string to"),
     "no such joint": (MJCF.format(more=""), ("knee",), "there is no joint knee: it has turn, tilt, slide and other"),
     "order": (MJCF.format(more=""), ("slide", "turn"), "turn carries a joint before it in the list"),
     "loop": (

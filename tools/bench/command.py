@@ -132,6 +132,13 @@ CASES = (
         ),
     ),
     Case(
+        "robots",
+        "Arms of public URDF files with other inertias, moved by MuJoCo: errors beside the Cramer-Rao bound.",
+        "robots",
+        ("robots",),
+        (option("--seeds", 20, "Recordings of each."), click.Option(["--robot"], multiple=True, help="Default: all.")),
+    ),
+    Case(
         "robot-motion",
         "Motions of robots: none beyond random limits, and errors beside those of a multisine of three times the time.",
         "robot_motion",

@@ -99,36 +99,53 @@ def _read(path: Path) -> tuple[Any, Any, dict[str, float], list[str]]:
     except ImportError:
         raise lacking(f"{path}: reading URDF and MJCF", "mujoco") from None
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        tree = ElementTree.fromstring(text)
-        if tree.tag == "robot":
-            for link in tree.iter("link"):
-                for one in [*link.findall("visual"), *link.findall("collision")]:
-                    link.remove(one)
-            moved = {one.find("child").get("link", "") for one in tree.findall("joint")  # type: ignore[union-attr]
-                     if one.get("type") != "fixed" and one.find("child") is not None}  # fmt: skip
-            bare = [one for one in tree.iter("link") if one.find("inertial") is None and one.get("name") in moved]
-            changed = [one for one in tree.iter("link") if one.find("inertial") is not None and _made_possible(one)]
-            for one in bare:
-                ElementTree.SubElement(one, "inertial")
-                _made_possible(one)
-            kinds = {
-                "without an inertial, taken as 0": bare,
-                "with an impossible inertia, the nearest is taken": changed,
-            }
-            notes = [f"{what}: {', '.join(printable(one.get('name', '')) for one in some)}"
-                     for what, some in kinds.items() if some]  # fmt: skip
-            limits = {one.get("name", ""): one.find("limit") for one in tree.findall("joint")}
-            speeds = {name: float(one.get("velocity", 0)) for name, one in limits.items() if one is not None}
-            model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
-            return mujoco, model, {name: one for name, one in speeds.items() if math.isfinite(one)}, notes
-        return mujoco, mujoco.MjModel.from_xml_path(str(path)), {}, []
+        tree = ElementTree.fromstring(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise PvidError(f"{path}: cannot be read: {error.strerror}") from None
     except (ElementTree.ParseError, UnicodeDecodeError) as error:
         raise PvidError(f"{path}: is no URDF or MJCF file: {reason(error)}") from None
+    speeds: dict[str, float] = {}
+    notes: list[str] = []
+    if tree.tag == "robot":
+        try:
+            speeds, notes = prepared_urdf(tree)
+        except ValueError as error:
+            raise PvidError(f"{path}: is no URDF file: {printable(reason(error))}") from None
+    try:
+        if tree.tag == "robot":
+            model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
+        else:
+            model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise PvidError(f"{path}: MuJoCo does not read it: {printable(reason(error))}") from None
+    return mujoco, model, speeds, notes
+
+
+def prepared_urdf(tree: ElementTree.Element) -> tuple[dict[str, float], list[str]]:
+    """Makes of a URDF what MuJoCo reads: without what is only drawn, with masses and inertias that bodies can have.
+
+    Raises ValueError where a number is none.
+
+    Returns
+    -------
+    Speeds of joints that have a limit of it, and what was changed.
+    """
+    for link in tree.iter("link"):
+        for one in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(one)
+    moved = {one.find("child").get("link", "") for one in tree.findall("joint")  # type: ignore[union-attr]
+             if one.get("type") != "fixed" and one.find("child") is not None}  # fmt: skip
+    bare = [one for one in tree.iter("link") if one.find("inertial") is None and one.get("name") in moved]
+    changed = [one for one in tree.iter("link") if one.find("inertial") is not None and _made_possible(one)]
+    for one in bare:
+        ElementTree.SubElement(one, "inertial")
+        _made_possible(one)
+    kinds = {"without an inertial, taken as 0": bare, "with an impossible inertia, the nearest is taken": changed}
+    notes = [f"{what}: {', '.join(printable(one.get('name', '')) for one in some)}"
+             for what, some in kinds.items() if some]  # fmt: skip
+    limits = {one.get("name", ""): one.find("limit") for one in tree.findall("joint")}
+    speeds = {name: float(one.get("velocity", 0)) for name, one in limits.items() if one is not None}
+    return {name: one for name, one in speeds.items() if math.isfinite(one)}, notes
 
 
 def _made_possible(link: ElementTree.Element) -> bool:
