@@ -134,6 +134,41 @@ def test_what_a_joint_has_beside_the_equations_is_named_and_in_the_errors(
     assert text in " ".join(one.text for one in found.verdict.reasons) and found.verdict.word == "usable"
 
 
+def _with(seed: int, *effects: tuple[int, float, str]) -> RobotAnswer:
+    log = robot_arms.log_of(SPATIAL, seed)
+    _, q, v, _ = robot_arms.motion(3, 20.0, RATE, seed)
+    for joint, size, law in effects:
+        log[f"tau{joint}"] += size * LAWS[law](q, v)[joint - 1]
+    return answer_of_robot(Recording(log.pop("t"), log, RATE), model_of(SPATIAL))
+
+
+TWO = (2, 4.0, "q"), (3, 0.3, "1")
+
+
+def test_of_two_terms_that_are_missing_each_is_named_with_its_size() -> None:
+    """In motions of 1.2 to 2.5 rad; by one of 1.0 rad (seed 1) a spring looks like gravity."""
+    found = [_with(seed, *TWO) for seed in (0, 3, 4)]
+    off = np.array([[(one.values[name].value or 0.0) for name in one.model.p_names] for one in found])
+    off = np.abs(off - truth_of(SPATIAL)) / [[one.se for one in each.values.values()] for each in found]
+    assert off.max() < 3
+    for one in found:
+        sizes = {(term.law, term.joint): term.size for term in sure(one.fit)}
+        assert sizes == pytest.approx({("q", 1): 4.0, ("1", 2): 0.3}, rel=0.1)
+
+
+def test_what_is_missing_is_no_payload_and_a_payload_is_not_negative() -> None:
+    found = payload_of(_with(3, *TWO), _with(4, *TWO))["m"]
+    assert found.value is not None and found.se is not None
+    assert abs(found.value) < 3 * found.se and (found.se_model or 0.0) > (found.se_noise or 0.0)
+    inner = SPATIAL.joints[-1].inertial
+    assert inner is not None
+    heavy = Chain(
+        (*SPATIAL.joints[:-1], replace(SPATIAL.joints[-1], inertial=(inner[0] + 1, *inner[1:]))), SPATIAL.gravity
+    )
+    with pytest.raises(PvidError, match="the payload's mass would be -1.* kg: are the recordings with and without"):
+        payload_of(_with(1), _answer(heavy, 2, model_of(SPATIAL)))
+
+
 def test_without_that_no_term_is_named() -> None:
     """And neither of 12 s: by Student's t of fewer windows."""
     assert not any(sure(one) for one in [*fits(6), *fits(6, seconds=12.0)])
@@ -213,7 +248,7 @@ def test_a_log_without_a_window_predicts_nothing() -> None:
 
 
 def test_a_slow_clock_is_refused() -> None:
-    with pytest.raises(PvidError, match="50 samples a second are too few for a robot: record at 100 Hz or more"):
+    with pytest.raises(PvidError, match="50 samples a second are too few for a robot: 100 or more"):
         identify_robot(model_of(SPATIAL), robot_arms.log_of(SPATIAL, 0), 50.0)
 
 

@@ -208,8 +208,10 @@ def _identified_robot(
         more = {"validation": {"prediction": {one.name: one.as_json() for one in found}}}
         lines = [f"{other}: the answer predicts {listed(found)}"]
     if empty is not None:
-        payload = payload_of(answer, answer_of_robot(recordings_of([empty], rig, columns)[0], model))
+        without = answer_of_robot(recordings_of([empty], rig, columns)[0], model)
+        payload = payload_of(answer, without)
         more["payload"] = _values_json(payload)
+        lines += [f"{empty}: {one.text}" for one in without.verdict.reasons]
         known = {
             name: with_error(one.value, one.se) for name, one in payload.items() if one.value is not None and one.se
         }

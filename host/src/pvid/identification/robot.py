@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pvid.base.errors import PvidError
+from pvid.base.rounding import with_error
 from pvid.base.wording import listed, with_unit
 from pvid.identification.answer import Answer, Factors, Float, Value
 from pvid.identification.bodies import REACHED, Bodies, bodies_of
@@ -18,7 +19,7 @@ from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.chain import INERTIAL
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.missing import student
-from pvid.oracle.weak.robot import Lacking, RobotFit, RobotRun, identify_robot
+from pvid.oracle.weak.robot import LAWS, Lacking, RobotFit, RobotRun, identify_robot
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 
@@ -26,7 +27,6 @@ _CLASH = 4.5  # standard errors between the halves: one of 60 parameters is as f
 _STILL = 0.14  # of the samples: 13 bits, 500 Hz, 0.8 rad/s; of 10 runs each 89 % of the values are within two standard
 # errors there and 83 % with 12 bits
 _CHANCE = 0.002  # of a clean recording: that one of all terms is taken for missing, by Student's t
-_TOO = 2.0  # of Student's t: from which the friction of another joint is doubted, too
 _APART = 2 / 3  # degrees of freedom of a window that overlaps half of the next
 _WORDS = {
     "q": "{size} * q{joint}: a spring, a cable, or a wrong gear",
@@ -176,13 +176,15 @@ class RobotAnswer(Answer):
         }
 
 
-def sure(fit: RobotFit) -> list[Lacking]:
-    """The term that is missing, if one is; of the friction of several joints each."""
-    limit = student(_APART * fit.windows, _CHANCE / 2 / max(len(fit.lacking), 1))
-    if not fit.lacking or abs(fit.lacking[0].t) <= limit:
-        return []
-    first, *others = fit.lacking
-    return [first, *(one for one in others if one.law == first.law == "slow" and abs(one.t) > _TOO)]
+def sure(fit: RobotFit) -> tuple[Lacking, ...]:
+    """The terms that are missing, with the sizes that they have together."""
+    limit = student(_APART * fit.windows, _CHANCE / 2 / (len(LAWS) * len(fit.run.chain.joints)))
+    found: tuple[Lacking, ...] = ()
+    for together in fit.lacking:
+        if together[-1].t <= limit:
+            break
+        found = together
+    return found
 
 
 def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
@@ -191,7 +193,7 @@ def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
     scale: Float = _gains(model)[:, np.newaxis] * fit.by_gain
     sizes, directions = np.linalg.eigh(fit.covariance)
     noise = directions * np.sqrt(np.maximum(sizes, 0.0))
-    change = np.array([one.shift for one in sure(fit)]).reshape(-1, len(fit.p))
+    change = _moved(fit)
     values = {}
     for k, unknown in enumerate(model.unknowns):
         if fit.undetermined[k]:
@@ -209,6 +211,11 @@ def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
     return RobotAnswer(model, fit, values, recording)
 
 
+def _moved(fit: RobotFit) -> Float:
+    """What each term that is missing moves the parameters by [terms, p]."""
+    return np.array([one.shift for one in sure(fit)]).reshape(-1, len(fit.p))
+
+
 def _gains(model: CompiledModel) -> Float:
     """Relative standard deviations of the torques [n]."""
     signals = [one.gain_sd for one in model.signals if one.kind == "input"]
@@ -223,7 +230,7 @@ def payload_of(loaded: RobotAnswer, empty: RobotAnswer) -> dict[str, Value]:
     Raises
     ------
     PvidError
-        Where the motions determine no base parameter of the bodies in common.
+        Where the motions determine no base parameter of the bodies in common, or the mass is clearly below 0.
     """
     chain = loaded.model.chain
     assert chain is not None
@@ -243,13 +250,21 @@ def payload_of(loaded: RobotAnswer, empty: RobotAnswer) -> dict[str, Value]:
     inverse = sizes[:, np.newaxis] * (directions[:rank].T / values[:rank]) @ seen[:, :rank].T @ roots
     hidden = sizes[:, np.newaxis] * directions[rank:].T
     of = inverse @ (loaded.fit.p - empty.fit.p)[own]
-    faint = bool(abs(of[0]) < _CLEAR_MASS * math.sqrt((inverse @ covariance @ inverse.T)[0, 0]))
     of[0] = of[0] or 1e-9  # of two recordings without a difference; it is faint
     tiny = 1e-30
     slopes = np.array([_about_centre(of + 1j * tiny * one).imag / tiny for one in np.eye(10)]).T
     noise = np.sqrt(np.einsum("ij,jk,ik->i", slopes @ inverse, covariance, slopes @ inverse))
     gains = _gains(loaded.model)[:, np.newaxis] * (loaded.fit.by_gain - empty.fit.by_gain)[:, own]
     scale = np.linalg.norm(slopes @ inverse @ gains.T, axis=1)
+    missing = np.concatenate([_moved(one.fit) for one in (loaded, empty)])[:, own]
+    missed = np.linalg.norm(slopes @ inverse @ missing.T, axis=1)
+    error = math.hypot(noise[0], scale[0], missed[0])
+    faint = bool(abs(of[0]) < _CLEAR_MASS * error)
+    if of[0] < -_CLEAR_MASS * error:
+        raise PvidError(
+            f"the payload's mass would be {with_error(float(of[0]), error)[0]} kg: are the recordings with and without "
+            "it swapped?"
+        )
     dark = np.linalg.norm(slopes @ hidden, axis=1) > _SEEN * np.linalg.norm(slopes * sizes, axis=1)
     dark[1:] |= dark[0]
     for k, name in enumerate(_PAYLOAD[4:], 4):  # Ixx about the centre contains cy and cz, Ixy cx and cy
@@ -262,8 +277,10 @@ def payload_of(loaded: RobotAnswer, empty: RobotAnswer) -> dict[str, Value]:
             why = "no torque depends on it alone" if dark[k] else "there is no mass that is clear of its error"
             out[name] = Value(unit, None, None, None, "not_identified", why)
         else:
-            total = math.hypot(noise[k], scale[k])
-            out[name] = Value(unit, float(value), total, float(noise[k]), se_scale=float(scale[k]), se_model=0.0)
+            parts = [float(one[k]) for one in (noise, scale, missed)]
+            out[name] = Value(
+                unit, float(value), math.hypot(*parts), parts[0], se_scale=parts[1], se_model=parts[2]
+            )  # fmt: skip
     return out
 
 

@@ -14,6 +14,7 @@ off (simulation extrapolation: J. Cook, L. Stefanski, JASA 89 (1994) 1314).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -47,6 +48,8 @@ _CLEAR_RATE = 3.0  # of the noise of a rate, likewise
 _REACHED = 1e-6  # of the energy of a direction: what slow steps have of it
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
 _MOST_BYTES = 4e9  # of the rows, with what is computed from them
+_TERMS = 3  # that may be missing; as many as joints, if these are more
+ALIKE = 2.0  # times as sure: friction that is soft where that of another joint is
 _DIRECTION = 1e-6  # relative size of a direction that is one
 
 
@@ -316,7 +319,8 @@ class Lacking:
     ----------
     law, joint : name in LAWS, and the joint from 0
     size : of the term [N m or N over the unit of the law]
-    t : the size in its standard errors, from the scatter of the windows, which is at least that of the rows
+    t : the size over its standard error when it was added, from the scatter of the windows, at least that of the rows;
+        of soft friction that another joint has too, ALIKE times that
     shift : what p moves by with the term [p]
     """
 
@@ -342,7 +346,7 @@ class RobotFit:
     apart : their difference over its standard error [p]
     undetermined : a standard error is worth more than a tenth of the torques [p]
     windows : of the run
-    lacking : every law of each joint, the surest first
+    lacking : terms that the equations may lack, one, two, .. together: each time the surest is added, as the last one
     """
 
     run: RobotRun
@@ -355,7 +359,7 @@ class RobotFit:
     apart: Float
     undetermined: npt.NDArray[np.bool_]
     windows: int
-    lacking: tuple[Lacking, ...]
+    lacking: tuple[tuple[Lacking, ...], ...]
 
     @property
     def design(self) -> RobotDesign:
@@ -455,31 +459,54 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     apart = np.abs(halves[0] - halves[1]) / np.sqrt(np.sum(variances, axis=0))
     return RobotFit(
         whole, columns, p, covariance, by_gain, uncorrected, np.array(halves), apart, undetermined, rows.windows,
-        tuple(sorted(_lacking(white, p, bread), key=lambda one: -abs(one.t))),
+        tuple(_lacking(white, p, bread)),
     )  # fmt: skip
 
 
-def _lacking(white: RobotRows, p: Float, bread: Float) -> Iterator[Lacking]:
-    """Scores of the laws in the residuals of p.
+def _lacking(white: RobotRows, p: Float, bread: Float) -> Iterator[tuple[Lacking, ...]]:
+    """Scores of the laws in the residuals of p, and beside those that were surest before.
 
     Parameters
     ----------
     bread : (X^T X)^-1, the noise of the encoders taken off
     """
     e = white.residuals(p)
-    for law, columns in zip(LAWS, white.others, strict=True):
-        for joint, column in enumerate(columns):
-            mixed = bread @ np.einsum("wpk,wk->p", white.regressors[joint], column)
-            rest = -np.einsum("iwpk,p->iwk", white.regressors, mixed)
-            rest[joint] += column
-            own = float(np.sum(rest[joint] * column))
-            if own <= _DIRECTION * float(np.sum(column**2)):
-                continue  # the parameters have it
-            size = float(np.sum(column * e[joint])) / own
-            scores = np.sum(rest * (e - size * rest), axis=(0, 2))
-            beside = float(np.sum((scores[:-1] * scores[1:])[white.next]))
-            error = np.sqrt(max(np.sum(scores**2) + 2 * max(beside, 0.0), own)) / own
-            yield Lacking(law, joint, size, size / max(float(error), 1e-300), -size * mixed)
+    terms, columns = [(law, joint) for law in LAWS for joint in range(len(e))], white.others.reshape(-1, *e.shape[1:])
+    mixed = np.array([bread @ np.einsum("wpk,wk->p", white.regressors[joint], column)
+                      for (_, joint), column in zip(terms, columns, strict=True)])  # fmt: skip
+    rests = -np.einsum("iwpk,tp->tiwk", white.regressors, mixed, optimize=True)
+    for rest, column, (_, joint) in zip(rests, columns, terms, strict=True):
+        rest[joint] += column
+    joints = [joint for _, joint in terms]
+    products = np.array([np.einsum("twk,twk->t", rest[joints], columns) for rest in rests])
+    gains, free = np.einsum("twk,twk->t", e[joints], columns), np.diag(products) > _DIRECTION * np.sum(
+        columns**2, axis=(1, 2))  # fmt: skip
+    chosen: list[int] = []
+    sure: list[float] = []
+    while len(chosen) < max(_TERMS, len(e)):
+        best = (0.0, -1)
+        for k in np.flatnonzero(free):
+            own = [*chosen, int(k)]
+            inner = products[np.ix_(own, own)]
+            beside = np.linalg.solve(inner[:-1, :-1], inner[:-1, -1])
+            left = float(inner[-1, -1] - inner[-1, :-1] @ beside)
+            if k in chosen or left <= _DIRECTION * inner[-1, -1]:
+                continue  # the parameters have it, or the others
+            sizes = np.linalg.solve(inner, gains[own])
+            rest = rests[k] - np.tensordot(beside, rests[chosen], 1)
+            scores = np.sum(rest * (e - np.tensordot(sizes, rests[own], 1)), axis=(0, 2))
+            twice = 2 * float(np.sum((scores[:-1] * scores[1:])[white.next]))
+            t = float(sizes[-1]) * left / math.sqrt(max(np.sum(scores**2) + max(twice, 0.0), left))
+            alike = terms[k][0] == "slow" and any(terms[one][0] == "slow" for one in chosen)
+            best = max(best, (abs(t) * (ALIKE if alike else 1.0), int(k)))
+        if best[1] < 0:
+            return
+        chosen.append(best[1])
+        sure.append(best[0])
+        sizes = np.linalg.solve(products[np.ix_(chosen, chosen)], gains[chosen])
+        yield tuple(
+            Lacking(*terms[k], float(size), t, -size * mixed[k]) for k, size, t in zip(chosen, sizes, sure, strict=True)
+        )
 
 
 def _root(parts: Float, grams: Float) -> Float:
