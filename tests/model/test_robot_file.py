@@ -108,6 +108,13 @@ def test_base_parameters_need_no_inertia_of_the_file(inertial: str, told: str, t
     assert mass is not None and mass[0] == (1.4 if inertial else 0.4)  # with the tool
 
 
+def test_a_warning_of_mujoco_is_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    chain_of(tmp_path, URDF.replace('lower="-2" upper="2"', 'lower="1" upper="1"'))
+    assert "# joint 'shoulder' has equal lower and upper limits, limit ignored" in (tmp_path / "robot.py").read_text()
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
 def test_a_transmission_hides_no_limit_and_an_endless_speed_is_none(tmp_path: Path) -> None:
     more = '<transmission name="t"><joint name="shoulder"/></transmission></robot>'
     joints = chain_of(tmp_path, URDF.replace("</robot>", more).replace('velocity="4"', 'velocity="inf"')).joints

@@ -111,6 +111,8 @@ def _read(path: Path) -> tuple[Any, Any, dict[str, float], list[str]]:
             speeds, notes = prepared_urdf(tree)
         except ValueError as error:
             raise PvidError(f"{path}: is no URDF file: {printable(reason(error))}") from None
+    usual = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: notes.append(printable(text)))  # or it writes a file into this folder
     try:
         if tree.tag == "robot":
             model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
@@ -118,6 +120,8 @@ def _read(path: Path) -> tuple[Any, Any, dict[str, float], list[str]]:
             model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise PvidError(f"{path}: MuJoCo does not read it: {printable(reason(error))}") from None
+    finally:
+        mujoco.set_mju_user_warning(usual)
     return mujoco, model, speeds, notes
 
 
