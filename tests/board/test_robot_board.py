@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_robot_core import ARMS, made
+from robot_models import ARMS, made
 
 from pvid.board.boards import BOARDS
 from pvid.board.replay_image import play

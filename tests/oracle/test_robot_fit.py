@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import robot_arms
+from robot_models import model_of, truth_of
 
 from pvid.base.errors import PvidError
 from pvid.identification.robot import RobotAnswer, answer_of_robot, payload_of, sure
-from pvid.model import Robot
 from pvid.model.chain import Chain
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.robot import LAWS, RobotFit, RobotRun, identify_robot
@@ -21,20 +21,6 @@ from pvid.rig.run import Recording
 
 RATE = 500.0
 SPATIAL = robot_arms.arm("spatial", seed=5)
-
-
-def model_of(chain: Chain) -> CompiledModel:
-    robot = Robot("arm", chain.gravity)
-    robot.joints = list(chain.joints)
-    for k in range(1, len(chain.joints) + 1):
-        robot.sensor(f"q{k}", "rad", resolution=1e-4)
-        robot.input(f"tau{k}", "N*m", hold="sampled")
-    return robot.compiled()
-
-
-def truth_of(chain: Chain) -> Any:
-    friction = {"Fv": 0.5, "Fc": 1.0}
-    return np.array([friction.get(chain.standard[one.standard].kind, chain.of_file(one)) for one in chain.base])
 
 
 def fits(seeds: int, **how: Any) -> list[RobotFit]:
