@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.case import chosen
 from bench.peers import compare
 from bench.peers.arm import JOINTS, standard_of, write_arm
 from bench.peers.compare import HEADER, TOOLS, fitted, interpreter, report, row, statements, tool_of
@@ -23,6 +24,11 @@ def test_every_tool_has_a_mechanism_and_every_mechanism_a_tool() -> None:
     named = {one for name in TOOLS for one in tool_of(name).RIGS}
     assert named == {*RIGS, "arm3"}
     assert OWN == ["pvid_itself", "pvid_refined", "scipy_simulation", "textbook"]
+
+
+def test_none_that_are_named_are_all() -> None:
+    assert chosen([], among=OWN) == chosen((), among=OWN) == tuple(OWN)
+    assert chosen([], ["kapitza"]) == ("kapitza",)
 
 
 @pytest.mark.parametrize("name", RIGS)

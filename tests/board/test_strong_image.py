@@ -3,14 +3,18 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from in_process import pvid
 
 from bench.kinds import KINDS
 from pvid.base.console import DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.compare.strong import StrongComparison
 from pvid.configuration.strong import strong_design
+from pvid.identification import strong
+from pvid.models.mechanisms import compiled_of
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
 from pvid.sim.simulated_run import simulation_of
@@ -42,6 +46,16 @@ def test_inertias_of_a_rigid_body_by_either_core(body: Path) -> None:
         for name, value in truth.items():
             one = shown["parameters"][name]
             assert abs(one["value"] - value) < 5 * one["se"], name
+
+
+def test_a_distance_from_the_weak_form_is_claimed_where_that_determines_a_value(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(strong, "reference_of", lambda found: np.concatenate([[np.nan], found.p[1:]]))
+    answer = strong.identify_strong_mechanism(recording("rigid_body"), compiled_of("rigid_body"), "f64")
+    (noise,) = (one.text for one in answer.doubts if one.name == "noise")
+    _, *others = answer.model.p_names
+    assert f"distance of {listed(others)} from the weak form, and of the others what" in noise
 
 
 @pytest.mark.parametrize(

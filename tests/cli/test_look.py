@@ -86,8 +86,13 @@ def test_a_table_of_a_motor_is_known_as_people_write_it(tmp_path: Path) -> None:
         ("time,V,i,speed", "t=time,w=speed", (doubt,)),
         ("Zeit [s],Spannung [V],Strom [A],n [1/min]", german, ()),
         ("t,U,I,n_rpm", "V=U,i=I,w=n_rpm:rev/min", ()),
+        ("t,V,i,w", "", (doubt.replace("speed", "w"),)),
+        ("t,V,i,n_soll_rpm,n_ist_rpm", "w=n_ist_rpm:rev/min", ()),
+        ("t,V,i,speed_ref,n_meas_rpm", "w=n_meas_rpm:rev/min", ()),
+        ("t,V,i,N,n_rpm", "w=n_rpm:rev/min", ()),
     ):
-        file = written(tmp_path / "motor.csv", head, [numbers(T), numbers(slow), numbers(SLOW), numbers(turns, 0)])
+        speeds = [numbers(turns + k, 0) for k in range(head.count(",") - 2)]
+        file = written(tmp_path / "motor.csv", head, [numbers(T), numbers(slow), numbers(SLOW), *speeds])
         first = proposals(survey := surveyed(file))[0]
         assert (first.mechanism, first.columns, first.doubts) == ("motor_speed", columns, doubts)
         assert all("clip" not in remark for one in survey.facts for remark in one.remarks)

@@ -10,7 +10,7 @@ import pytest
 from fleet_rows import DAY, row
 
 from pvid.fleet.changes import FALSE_ALARMS, Change, Series
-from pvid.fleet.dates import began_of, named_without_date
+from pvid.fleet.dates import began_of, boards_of
 from pvid.fleet.page import Fleet, page, sentence
 from pvid.fleet.row import Row
 
@@ -122,21 +122,37 @@ def test_a_recording_says_when_it_began(tmp_path: Path, text: str) -> None:
     assert began_of(path) == (seconds, by)
 
 
+DAYS = ("2026-09-01", "2026-10-01")
+ENDS = ["{}", "{}T14-30-05.123", "{}_143005_877", "{}_9-05", "{}(1)", "{} - Copy", "{}T143005Z", "01.{:.2}.2026"]
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_what_follows_a_date_is_no_part_of_a_board(end: str) -> None:
+    ends = [end.format(day if "{}" in end else day[5:]) for day in DAYS]
+    paths = [Path(f"all/{board}_{one}.csv") for board in ("b3", "b4") for one in ends]
+    assert list(boards_of(paths).values()) == ["all/b3", "all/b3", "all/b4", "all/b4"]
+
+
 @pytest.mark.parametrize(
-    ("name", "board"),
+    "groups",
     [
-        ("board3_2026-09-01.csv", "board3"),
-        ("2026-09-01_1405 axis-2.csv", "axis-2"),
-        ("board_1-2026-09-01.csv", "board_1"),
-        ("pump-017.npz", "pump"),
-        ("run7.csv", ""),
-        ("2026-09-01.csv", ""),
-        ("0007_2026-09-01.csv", ""),
-        ("monday.csv", ""),
+        {"motors/b3": ("b3/run1_{0}", "b3/run2_{1}", "b3/after_{1}"), "motors/b4": ("b4/run1_{0}", "b4/before_{0}")},
+        {"motors": ("before_{0}", "after_{1}", "monday", "0007_{0}", "{1}")},
+        {"motors": ("board-3", "board-4", "AK80-9", "AK80-64")},
+        {"motors/board-3": ("board-3-001", "board-3-002"), "motors/board-4": ("board-4-001", "board-4-017")},
+        {"motors/motor_1": ("motor_1_{0}", "motor_1_{1}"), "motors/motor_2": ("motor_2_{0}",)},
+        {"motors/motor_01": ("motor_01_{0}", "motor_01_{1}"), "motors/motor_02": ("motor_02_{0}", "motor_02_{1}")},
+        {"motors/b3": ("b3_1_{0}", "b3_2_{1}"), "motors/b4": ("b4_1_{0}", "b4_2_{1}")},
+        {"motors/b3": ("b3_1_1.09.2026", "b3_2_1.10.2026"), "motors/b4": ("b4_1-09-2026", "b4_1-10-2026_2")},
+        {"motors/axis-2": ("{0}_1405 axis-2", "{1}_1405 axis-2"), "motors": ("monday",)},
+        {"motors/b3": ("b3/{0}/run", "b3/{1}/run"), "motors/b4": ("b4/2026-09/a",)},
+        {"motors/b3": ("2026-09/b3_{0}", "2026-10/b3_{1}"), "motors/b4": ("2026-09/b4_{0}",)},
     ],
 )
-def test_a_board_is_in_the_name_of_its_recordings(name: str, board: str) -> None:
-    assert named_without_date(Path(name)) == board
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz"])
+def test_recordings_of_a_board_share_a_folder_or_a_name(groups: dict[str, tuple[str, ...]], suffix: str) -> None:
+    right = {Path(f"motors/{name.format(*DAYS)}{suffix}"): board for board, names in groups.items() for name in names}
+    assert boards_of(right) == right
 
 
 def test_a_board_that_differs_from_all_others_is_named() -> None:

@@ -62,7 +62,7 @@ def chosen(
         among = names()
     if unknown := set(given) - set(among):
         raise PvidError(f"no such {what}: {', '.join(sorted(unknown))}; there are {', '.join(among)}")
-    return tuple((usual or among) if given == () else given)
+    return tuple(given or usual or among)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from glob import glob, has_magic
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from pvid.fleet.page import Fleet
     from pvid.fleet.row import Question
 
-_SHOWN = 20  # failures
+_SHOWN = 20  # failures, boards
 
 _OPTIONS = (
     click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Parquet file, a row a file."),
@@ -71,9 +72,10 @@ def command(patterns: tuple[str, ...], **given: Any) -> int:
 
     FILE may be a pattern in quotes, 'runs/*.csv' or 'fleet/**/*.pvlog', or a folder: all recordings in it. A second
     call with the same -o computes only what is new or has changed, also after an interruption. The page shows what
-    changed in the parameters of each board: a board is the USB serial number of a log; of a run its folder, and its
-    name without date or number: board3_2026-09-01.csv. With --report it has links to the reports of `identify`. With
-    --together the FILEs of a folder are recordings of one mechanism, which are identified together.
+    changed in the parameters of each board: a board is the USB serial number of a log; of a run its folder, or, of
+    runs in one folder, what their names share without date and number: board3_2026-09-01.csv. With --report it has
+    links to the reports of `identify`. With --together the FILEs of a folder are recordings of one mechanism, which
+    are identified together.
 
     Exit code 1: a log is not equal to its twin. 4: a parameter changed by --alarm or more. 3: nothing was identified.
     """
@@ -82,6 +84,9 @@ def command(patterns: tuple[str, ...], **given: Any) -> int:
     fleet = job.done(paths)
     for name, count in fleet.counts.items():
         click.echo(f"{name}: {count} of {len(fleet.rows)}")
+    boards = Counter(row.board for row in fleet.rows)
+    more = f" and {len(boards) - _SHOWN} more" if len(boards) > _SHOWN else ""
+    click.echo(f"boards: {', '.join(f'{one} ({count})' for one, count in [*boards.items()][:_SHOWN])}{more}")
     failures = [row for row in fleet.rows if row.failure is not None]
     for row in failures[:_SHOWN]:
         assert row.failure is not None

@@ -15,7 +15,7 @@ from pvid.base.errors import PvidError
 from pvid.base.version import __version__
 from pvid.base.wording import reason
 from pvid.board.mechanism_board import board_of
-from pvid.fleet.dates import began_of, named_without_date
+from pvid.fleet.dates import began_of
 from pvid.log.file import Segment
 from pvid.log.reader import LogReader
 from pvid.log.rig import LOG_SUFFIX, hello_of_log, settings_text_of_log
@@ -72,8 +72,8 @@ class Row:
     ----------
     key : of its content and the question
     path : as it was given; of recordings that are identified together their folder
-    board : USB serial number of the board that sent a log, else its name and folder; of a run its folder, and what its
-        file is called beside a date or a number
+    board : USB serial number of the board that sent a log, else its name and folder; of a run its folder, until
+        `pvid.fleet.dates.boards_of` sees them all
     began : seconds since 1970
     dated : what says so: "log", "recording", "name" or, of a run without a date, "file"
     samples : that were identified
@@ -171,7 +171,7 @@ def _told(error: OSError | PvidError) -> str:
 def _origin(path: Path) -> tuple[str, float, str]:
     """The board, when it began, and what says so."""
     if path.suffix != LOG_SUFFIX:
-        return str(path.parent / named_without_date(path)), *began_of(path)
+        return str(path.parent), *began_of(path)
     began, dated, serial = path.stat().st_mtime, "file", ""
     for record in LogReader(path):
         if isinstance(record.item, Segment):

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pvid.base.cluster import client, each, processors
 from pvid.base.errors import PvidError
+from pvid.fleet.dates import boards_of
 from pvid.fleet.row import Question, Row, row_of
 from pvid.fleet.store import Store
+from pvid.log.rig import LOG_SUFFIX
 
 
 def run(
@@ -52,7 +55,9 @@ def run(
                 done[row.path] = row
                 progress(len(rows) + len(done))
         rows |= {place: done[_path(place)] for place in missing}
-    found = sorted(rows.values(), key=lambda row: (row.board, row.began, row.path))
+    boards = {} if together else boards_of(path for path in map(Path, files) if path.suffix != LOG_SUFFIX)
+    own = (replace(row, board=boards.get(Path(row.path), row.board)) for row in rows.values())
+    found = sorted(own, key=lambda row: (row.board, row.began, row.path))
     store.finish(found)
     return found
 

@@ -29,6 +29,7 @@ from pvid.settings.enums import Law, Reason
 _UNKNOWN_OF_RANGE = 0.5  # as in the verdict of the weak form
 _CLASH = 3.0  # standard errors between the core and the analysis
 _GOOD = (Reason.UPDATED, Reason.MISFIT, Reason.ACCUMULATED)
+_DISTANCE = "their distance from the weak form"
 _BIAS = (
     "The strong form differentiates the samples, and their noise biases its regressors; the standard errors contain {}"
     ". The weak form (omit --form strong) has no such bias."
@@ -169,7 +170,11 @@ def _doubts(
     elif held is not None:
         yield Doubt("not_identified", "The strong form has published no estimate.")
     fitted = design.fitted
-    known = "their distance from the weak form" if fitted.bias.any() else "what another window changes, not all of it"
+    near = [one for one, bias in zip(model.p_names, fitted.bias, strict=True) if bias]
+    known = "what another window changes, not all of it"
+    if near:
+        rest = len(near) < len(p)
+        known = f"the distance of {listed(near)} from the weak form, and of the others {known}" if rest else _DISTANCE
     yield Doubt("noise", _BIAS.format(known))
     bounds = _CLASH * np.hypot(noise, fitted.error)
     apart = [one for one, x, y, most in zip(model.p_names, p, fitted.p, bounds, strict=True) if abs(x - y) > most]

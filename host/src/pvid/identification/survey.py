@@ -19,7 +19,17 @@ from pvid.identification.wild_samples import MOST_FAR, far_from_median
 from pvid.models.mechanisms import described
 from pvid.models.registry import most_specific
 from pvid.models.registry import names as shipped_names
-from pvid.rig.columns import TIME, Channel, Column, Columns, MissingColumnError, typed, unit_in, unit_in_brackets
+from pvid.rig.columns import (
+    TIME,
+    Channel,
+    Column,
+    Columns,
+    MissingColumnError,
+    of_set_value,
+    typed,
+    unit_in,
+    unit_in_brackets,
+)
 from pvid.rig.gaps import at_its_ends, holds_changes
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import LONG_BLANK_ROWS, MIN_ROWS, Recording, read_table, recording_of_table
@@ -356,7 +366,7 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
         alike = same or [one for one in free if channel.is_called(one)] or [one for one in free if stated.get(one)]
         if not alike:
             return None
-        own[channel.name] = alike[0]
+        own[channel.name] = min(alike, key=of_set_value)
     units = {one.name: one.unit for one in channels_of(description)}
     sizes = {one.name: max(abs(one.low), abs(one.high)) for one in survey.facts}
     doubts: list[str] = []
@@ -366,7 +376,7 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
         written = typed(survey.names, survey.names.index(name))
         in_si = not unit or scale_to(units[signal], unit) == Scale()
         other, largest = _OFTEN_OTHER.get(units[signal], ("", np.inf))
-        if name not in (signal, *stated) and not unit and sizes[name] > largest:
+        if name not in stated and not unit and sizes[name] > largest:
             doubts.append(
                 f"{name} states no unit: {units[signal]} is assumed; write {signal}={written}:{other} for {other}"
             )

@@ -43,13 +43,22 @@ class Channel:
         return re.search(usual, name, re.I) is not None
 
 
+def of_set_value(name: str) -> int:
+    """Rank of a column among those that are called alike: 0 of what is measured, 2 of what is set, 1 of neither."""
+    parts = set(re.split(r"[\W_\d]+", name.lower()))
+    return 0 if parts & _MEASURED else 2 if parts & _SET else 1
+
+
+_MEASURED = frozenset("ist act actual meas measured fbk feedback".split())
+_SET = frozenset("soll set setpoint sp ref reference cmd command commanded target des desired".split())
+
 TIME = Channel("t", "s", usual=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
 
 # What people call a signal of a unit, besides its own name.
 _USUAL_NAMES = {
     "rad": r"phi|φ|angle|ang|theta|winkel|enc|deg|rad|pend|°",
     "m": r"height|^h$|^h[^a-z]|pivot|cart|base|pos|disp|laser|dist|^x$|^y$|^z",
-    "rad/s": r"omega|ω|rate|speed|veloc|rpm|gyro|drehzahl|^n$|^n[^a-z]",
+    "rad/s": r"omega|ω|rate|speed|veloc|rpm|gyro|drehzahl|(?-i:^n(?![a-zA-Z]))",
     "m/s": r"speed|veloc|^v$",
     "V": r"volt|spannung|^u$|^u[^a-z]|^v$",
     "A": r"curr|strom|amp|^i$|^i[^a-z]",
@@ -221,7 +230,7 @@ class Columns:
                 place = order
             elif place is None:
                 alike = (k for k, name in enumerate(names) if k not in taken and channel.is_called(name))
-                place = next(alike, None)
+                place = min(alike, key=lambda k: of_set_value(names[k]), default=None)
             elif signal not in self.named:
                 continue
             if place is None:
