@@ -233,7 +233,6 @@ OTHERS = {
     "core": "identify log.csv --model robot.py --core f32",
     "refine": "identify log.csv --model robot.py --refine",
     "report": "identify log.csv --model robot.py --report report.html",
-    "write-model": "identify log.csv --model robot.py --write-model more.py",
     "add": "identify log.csv --model robot.py --add k*q1",
 }
 

@@ -41,7 +41,11 @@ from pvid.settings.cores import FLOAT
     help="Add a term with one new unknown, as in --add 'equation 2: drag*abs(w)*w', or "
     "change a signal, as in --add 'V: V + drop*sgn(V)', and show the values without it and with it.",
 )
-@click.option("--write-model", type=NewFile(), help="With --add: write the model file with the terms.")
+@click.option(
+    "--write-model",
+    type=NewFile(),
+    help="With --add: write the model file with the terms. Of a robot: its URDF or MJCF file with the answer.",
+)
 @click.option(
     "--validate",
     "other",

@@ -17,7 +17,7 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, working, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
-from pvid.base.wording import listed
+from pvid.base.wording import listed, printable
 from pvid.cli.input import print_notes
 from pvid.codegen.weak_sizes import refuse_too_many_unknowns
 from pvid.identification.analysis import analysed, own_of
@@ -93,7 +93,8 @@ def identify_run(
     refine : the equations are fitted to the whole run, from the answer on; None: as of pvid.identification.road
     other : another recording, of which is said how well the answer predicts it
     empty : a recording of a robot without its payload
-    add, write_model : terms that are added to the model, and where the model file with them is written
+    add : terms that are added to the model
+    write_model : where the model file with them is written; of a robot, where its URDF or MJCF file
     own, shared : unknowns that each recording has of its own, or not, as in pvid.identification.analysis.own_of
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
@@ -102,9 +103,8 @@ def identify_run(
     if rig.compiled().chain is not None:
         asked: dict[str, Any] = {"--on": on, "--refine": refine, "--add": add, "--own": own, "--shared": shared}
         asked |= {"--weights": weights != "residuals", "--figure": pictures.figure, "--report": pictures.report}
-        asked["--write-model"] = write_model
         asked |= {f"--{option} {value}": value for option, value in only_in_c.items()}
-        return _identified_robot(paths, rig, columns, other, empty, asked, as_json=as_json)
+        return _identified_robot(paths, rig, columns, other, empty, write_model, asked, as_json=as_json)
     if empty is not None:
         raise PvidError(f"--without is for the payload of a robot, which {name} is not: omit it")
     if len(paths) > 1:
@@ -188,6 +188,7 @@ def _identified_robot(
     columns: str | None,
     other: Path | None,
     empty: Path | None,
+    written: Path | None,
     asked: Mapping[str, Any],
     *,
     as_json: bool,
@@ -198,9 +199,21 @@ def _identified_robot(
     for option, value in asked.items():
         if value and option not in ("--core f64", "--form weak"):
             rig.compiled().refuse_robot(option)
+    source = None
+    if written is not None:
+        from pvid.identification.robot_writing import source_of as source_of_robot
+
+        source = source_of_robot(rig.model, written)
     recording, model = recordings_of(paths, rig, columns)
     with working("identifying"):
         answer = answer_of_robot(recording, model)
+    if written is not None and source is not None and answer.identified:
+        from pvid.identification.robot_writing import write_robot
+
+        files = listed(printable(one.name) for one in paths)
+        for one in write_robot(answer, source, written, f"{files}, by {source.model}"):
+            write_stderr(f"pvid: {written}: {one}")
+        write_stderr(f"pvid: {written}: {source.path.name} with the identified values")
     more: dict[str, Any] = {}
     lines: list[str] = []
     if other is not None:

@@ -67,7 +67,7 @@ def from_file(path: Path, out: Path, joints: tuple[str, ...]) -> int:
 
     if out.suffix != ".py":
         raise PvidError(f"{out}: the name of a model file ends with .py")
-    write_whole(out, model_text(path, listed_names(joints)))
+    write_whole(out, model_text(path, listed_names(joints), out.parent))
     compiled = compiled_of(out)
     click.echo(f"{out}: {len(compiled.signals) // 2} joints, {len(compiled.unknowns)} base parameters")
     return DONE

@@ -66,14 +66,20 @@ def bodies_of(chain: Chain, p: Float, covariance: Float, lost: npt.NDArray[np.bo
     """From base parameters [p], their covariance, and which of them are not determined; None: the file has no
     inertias, or impossible ones, or no parameter of a body is determined. Milliseconds for 7 joints."""
     own = [k for k, one in enumerate(chain.base) if chain.standard[one.standard].kind in INERTIAL and not lost[k]]
-    file = np.array([one.inertial for one in chain.joints if one.inertial is not None])
-    if not own or len(file) < len(chain.joints) or np.linalg.eigvalsh(pseudo_inertias(file)).min() <= 0:
+    every = np.array([one.inertial or [np.nan] * len(INERTIAL) for one in chain.joints])
+    real = every.any(axis=1)  # of two joints that move one body the first has none
+    file = every[real]
+    if not (own and len(file) and np.isfinite(file).all() and np.linalg.eigvalsh(pseudo_inertias(file)).min() > 0):
         return None
-    shares = np.zeros((len(own), file.size))
+    shares, p = np.zeros((len(own), every.size)), p.copy()
     for row, k in zip(shares, own, strict=True):
         for place, factor in chain.base[k].parts:
             one = chain.standard[place]
-            row[len(INERTIAL) * one.joint + INERTIAL.index(one.kind)] = factor
+            if one.kind == "Ia":  # a rotor that no torque tells from a body: the file's
+                p[k] -= factor * (chain.joints[one.joint].rotor or 0.0)
+            else:
+                row[len(INERTIAL) * one.joint + INERTIAL.index(one.kind)] = factor
+    shares = shares[:, np.repeat(real, len(INERTIAL))]
     sd = np.sqrt(np.diag(covariance)[own])
     related = covariance[np.ix_(own, own)] / np.outer(sd, sd) + _RIDGE * np.eye(len(own))
     root = np.linalg.inv(np.linalg.cholesky(related)) / sd
@@ -85,7 +91,8 @@ def bodies_of(chain: Chain, p: Float, covariance: Float, lost: npt.NDArray[np.bo
         found = _nearest(a, y, pull, g, found)
         off = (shares @ found - p[own]) / sd
         if g < _LEAST or np.max(np.abs(off)) < REACHED:
-            return Bodies(found.reshape(file.shape), tuple(own), off)
+            every[real] = found.reshape(file.shape)
+            return Bodies(every, tuple(own), off)
         g /= _LOWER
 
 

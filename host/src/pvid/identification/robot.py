@@ -129,10 +129,42 @@ class RobotAnswer(Answer):
         return Verdict(tuple(reasons))
 
     @cached_property
+    def possible(self) -> tuple[Float, tuple[int, ...], Bodies | None]:
+        """Parameters [p] where none of friction and of rotors is below 0: the others are as the covariance has them
+        with those 0; which these are, and possible bodies, nearest to the file's; None: the file has none."""
+        chain, p, covariance = self.model.chain, self.fit.p.copy(), self.fit.covariance.copy()
+        assert chain is not None
+        hidden, low = self.fit.undetermined.copy(), list[int]()
+        positive = [k for k, one in enumerate(chain.base) if chain.standard[one.standard].kind in ("Ia", "Fv", "Fc")]
+        while (worst := min((k for k in positive if not hidden[k]), key=lambda k: p[k], default=None)) is not None:
+            if p[worst] >= 0:
+                break
+            gain = covariance[:, worst] / covariance[worst, worst]
+            p -= gain * p[worst]
+            covariance -= np.outer(gain, covariance[worst])
+            p[worst], hidden[worst] = 0.0, True
+            low.append(worst)
+        return p, tuple(low), bodies_of(chain, p, covariance, hidden)
+
+    @property
     def bodies(self) -> Bodies | None:
-        """Possible ones, nearest to the file's; None: the file has none."""
-        assert self.model.chain is not None
-        return bodies_of(self.model.chain, self.fit.p, self.fit.covariance, self.fit.undetermined)
+        """Of `possible`."""
+        return self.possible[2]
+
+    @property
+    def impossible(self) -> list[str]:
+        """What no robot has of the values, in sentences."""
+        low, bodies, names = *self.possible[1:], self.model.p_names
+        told = (
+            [f"no robot has {listed(names[k] for k in low)} below 0: its bodies are those with 0 there"] if low else []
+        )
+        if bodies is not None and np.max(np.abs(bodies.off)) > REACHED:
+            worst = int(np.argmax(np.abs(bodies.off)))
+            told.append(
+                f"no possible bodies (mass and inertia positive) have all these values: the nearest ones differ by "
+                f"{abs(bodies.off[worst]):.2g} standard errors of {names[bodies.base[worst]]}"
+            )
+        return told
 
     @property
     def lines(self) -> list[str]:
@@ -144,13 +176,8 @@ class RobotAnswer(Answer):
             f"verdict {self.verdict.word}; {self.fit.windows} windows of {design.functions.length:.3g} s; rates over "
             f"{design.taps} samples",
             *(f"{chain.name_of(one)} = {chain.closed_form(one)}" for one in combined),
+            *self.impossible,
         ]
-        if self.bodies is not None and np.max(np.abs(self.bodies.off)) > REACHED:
-            worst = int(np.argmax(np.abs(self.bodies.off)))
-            lines.append(
-                f"no possible bodies (mass and inertia positive) have all these values: the nearest ones differ by "
-                f"{abs(self.bodies.off[worst]):.2g} standard errors of {self.model.p_names[self.bodies.base[worst]]}"
-            )
         return [*lines, f"predicts torques that were not fitted: {listed(self.prediction)}"]
 
     def as_json(self) -> dict[str, Any]:

@@ -22,11 +22,13 @@ class Robot(Model):
     """A mechanism of rigid bodies in a tree of joints; `compiled` has its base parameters as unknowns.
 
     The signals are q1, tau1, q2, tau2, .. in the order of the joints; a joint with a torque constant has a current i1
-    in place of tau1.
+    in place of tau1. `file` is the URDF or MJCF file that it is from, by the path from its model file: identified
+    values can be written to a copy of it.
     """
 
-    def __init__(self, title: str, gravity: Sequence[float] = (0.0, 0.0, -9.81)) -> None:
+    def __init__(self, title: str, gravity: Sequence[float] = (0.0, 0.0, -9.81), file: str | None = None) -> None:
         super().__init__(title)
+        self.file = file
         self.joints: list[Joint] = []
         self.gravity = self._three("gravity", gravity)
         self.space: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None

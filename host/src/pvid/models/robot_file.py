@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -24,74 +26,127 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _LEAST_SECOND, _ROUGH = 1e-12, 1e-6  # [kg*m^2]; of the largest second moment
 _LOCKED = 1e-6  # cosine of the pitch below which roll and yaw turn about one axis
 _LEAST_MASS = 1e-11  # [kg]
+_SLIDES = 2  # mjJNT_SLIDE
 
 
-def model_text(path: Path, chosen: Sequence[str] = ()) -> str:
-    """The text of a model file.
+@dataclass(frozen=True)
+class Placed:
+    """A robot's file as MuJoCo has it, at the zero of all joints.
 
-    Raises PvidError where the file cannot be read, or is no robot on a fixed base with known inertias.
+    Attributes
+    ----------
+    model, data : MuJoCo's
+    speeds, notes : that URDF allows; what was changed
+    joints, names : MuJoCo's numbers of those that move, and their names
+    before : of each the place of the joint that carries it; -1: the base
+    carrier : of each body the place of the joint that moves it; -1: it rests
+    frames : of each joint's body its origin on the axis, and its rotation; the last is the base's
+    """
+
+    model: Any
+    data: Any
+    speeds: Mapping[str, float]
+    notes: Sequence[str]
+    joints: Sequence[int]
+    names: Sequence[str]
+    before: Sequence[int]
+    carrier: Sequence[int]
+    frames: Sequence[tuple[Float, Float]]
+
+    def joint(self, place: int) -> tuple[Float, Float, Float]:
+        """Axis of a joint, and origin and rotation of its body in the frame of the joint before."""
+        (at, turned), (start, base) = self.frames[place], self.frames[self.before[place]]
+        return turned.T @ self.data.xaxis[self.joints[place]], base.T @ (at - start), base.T @ turned
+
+    def slides(self, place: int) -> bool:
+        """Whether a joint is prismatic."""
+        return bool(self.model.jnt_type[self.joints[place]] == _SLIDES)
+
+    def into(self, place: int, body: int) -> Float:
+        """From the frame of a joint's body to that of a body, of homogeneous points [4, 4]."""
+        at, turned = self.frames[place]
+        back = self.data.xmat[body].reshape(3, 3).T
+        return np.block([[back @ turned, (back @ (at - self.data.xpos[body]))[:, np.newaxis]], [np.eye(4)[3:]]])
+
+    def inertial(self, place: int, bodies: Sequence[int] | None = None) -> Float:
+        """Mass, first moments and inertia of all that a joint moves, or of some bodies, in the joint's frame [10]."""
+        own = [k for k, one in enumerate(self.carrier) if one == place] if bodies is None else bodies
+        return _inertial(self.model, self.data, own, *self.frames[place])
+
+
+def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Placed:
+    """A robot's file.
+
+    Raises PvidError where it cannot be read, or is no robot on a fixed base with known inertias.
 
     Parameters
     ----------
     path : URDF or MJCF
     chosen : names of the joints that move and are recorded, in the order of the columns; others are held at their zero;
         (): all
+    fused : links of URDF that fixed joints tie are one body
     """
-    mujoco, model, speeds, notes = _read(path)
+    mujoco, model, speeds, notes = _read(path, fused=fused)
     joints = _chosen(mujoco, model, path, chosen)
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr] = 0.0
     mujoco.mj_kinematics(model, data)
     carrier = _carriers(model, joints)
     _refuse_loops(mujoco, model, carrier, path)
+    before = [
+        max((k for k in range(place) if _is_under(model, joint, joints[k])), default=-1, key=lambda k: (
+            int(model.jnt_bodyid[joints[k]]), joints[k]))
+        for place, joint in enumerate(joints)
+    ]  # fmt: skip
+    frames = [(data.xanchor[k].copy(), data.xmat[int(model.jnt_bodyid[k])].reshape(3, 3)) for k in joints]
+    names = [_names(model)[joint] for joint in joints]
+    base = (np.zeros(3), np.eye(3))
+    return Placed(model, data, speeds, notes, joints, names, before, carrier, [*frames, base])
+
+
+def model_text(path: Path, chosen: Sequence[str] = (), folder: Path | None = None) -> str:
+    """The text of a model file, which lies in a folder, that of the robot's file by default.
+
+    Raises PvidError, and has the parameters, as `placed`.
+    """
+    robot = placed(path, chosen)
+    model, names = robot.model, robot.names
+    source = os.path.relpath(path, folder or path.parent).replace(os.sep, "/")
     lines = [
-        json.dumps(f"{printable(path.name)}: {len(joints)} joints, by `pvid model from`."),
+        json.dumps(f"{printable(path.name)}: {len(names)} joints, by `pvid model from`."),
         "",
         "from pvid.model import Robot, pi",
         "",
-        *(f"# {one}" for one in notes),
-        f"model = Robot({json.dumps(printable(path.stem))}, gravity={_numbers(model.opt.gravity)})",
+        *(f"# {one}" for one in robot.notes),
+        f"model = Robot({json.dumps(printable(path.stem))}, gravity={_numbers(model.opt.gravity)}, "
+        f"file={json.dumps(source)})",
     ]
-    frames: dict[int, tuple[Float, Float]] = {-1: (np.zeros(3), np.eye(3))}
-    names: list[str] = []
-    for place, joint in enumerate(joints):
-        body = int(model.jnt_bodyid[joint])
-        turned = data.xmat[body].reshape(3, 3)
-        frames[place] = data.xanchor[joint].copy(), turned
-        before = max((k for k in range(place) if _is_under(model, joint, joints[k])), default=-1, key=lambda k: (
-            int(model.jnt_bodyid[joints[k]]), joints[k]))  # fmt: skip
-        at, base = frames[before]
-        name = printable(model.joint(joint).name or f"joint{place + 1}")
-        given = {"axis": _numbers(turned.T @ data.xaxis[joint])}
-        origin = _numbers(base.T @ (frames[place][0] - at))
-        given |= {"origin": origin} if origin != "(0, 0, 0)" else {}
-        rpy = _rpy(base.T @ turned)
-        given |= {"rpy": rpy} if rpy != "(0, 0, 0)" else {}
-        if before != place - 1:
+    for place, (joint, name) in enumerate(zip(robot.joints, names, strict=True)):
+        axis, at, turned = robot.joint(place)
+        given = {"axis": _numbers(axis)}
+        given |= {"origin": origin} if (origin := _numbers(at)) != "(0, 0, 0)" else {}
+        given |= {"rpy": rpy} if (rpy := _rpy(turned)) != "(0, 0, 0)" else {}
+        if (before := robot.before[place]) != place - 1:
             given["parent"] = repr(names[before] if before >= 0 else "base")
-        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+        if robot.slides(place):
             given["prismatic"] = "True"
-        if model.dof_armature[model.jnt_dofadr[joint]] > 0:
-            given["rotor"] = _number(float(model.dof_armature[model.jnt_dofadr[joint]]))
         dof = int(model.jnt_dofadr[joint])
+        if model.dof_armature[dof] > 0:
+            given["rotor"] = _number(float(model.dof_armature[dof]))
         if (rubbed := (model.dof_damping[dof], model.dof_frictionloss[dof])) != (0, 0):
             given["friction"] = _numbers(rubbed)
         if model.jnt_limited[joint]:
             given["limits"] = _numbers(model.jnt_range[joint])
-        if speeds.get(name, 0) > 0:
-            given["speed"] = _number(speeds[name])
+        if robot.speeds.get(name, 0) > 0:
+            given["speed"] = _number(robot.speeds[name])
         if model.jnt_actfrclimited[joint] and (most := min(abs(model.jnt_actfrcrange[joint]))) > 0:
             given["torque"] = _number(most)
-        own = [k for k in range(1, model.nbody) if carrier[k] == place]
-        given["inertial"] = _numbers(_inertial(model, data, own, *frames[place]))
-        names.append(name)
-        last = given.pop("inertial")
         first = ", ".join([json.dumps(name), *(f"{key}={value}" for key, value in given.items())])
-        lines += [f"model.joint({first},", f"            inertial={last})"]
+        lines += [f"model.joint({first},", f"            inertial={_numbers(robot.inertial(place))})"]
     return "\n".join([*lines, ""])
 
 
-def _read(path: Path) -> tuple[Any, Any, dict[str, float], list[str]]:
+def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float], list[str]]:
     """MuJoCo, its model of a file, the speeds that URDF allows, and what was changed; what is only drawn is not needed
     of URDF."""
     try:
@@ -111,6 +166,12 @@ def _read(path: Path) -> tuple[Any, Any, dict[str, float], list[str]]:
             speeds, notes = prepared_urdf(tree)
         except ValueError as error:
             raise PvidError(f"{path}: is no URDF file: {printable(reason(error))}") from None
+        if not fused:
+            options = tree
+            for name in ("mujoco", "compiler"):
+                found = options.find(name)
+                options = ElementTree.SubElement(options, name) if found is None else found
+            options.set("fusestatic", "false")
     usual = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: notes.append(printable(text)))  # or it writes a file into this folder
     try:
@@ -179,9 +240,14 @@ def _made_possible(link: ElementTree.Element) -> bool:
     return bool(impossible)
 
 
+def _names(model: Any) -> list[str]:
+    """Of all joints."""
+    return [printable(model.joint(one).name or f"joint{one + 1}") for one in range(model.njnt)]
+
+
 def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[int]:
     """Numbers of the joints, those of a body before those that it carries."""
-    names = [model.joint(one).name for one in range(model.njnt)]
+    names = _names(model)
     for one in range(model.njnt):
         if model.jnt_type[one] == mujoco.mjtJoint.mjJNT_FREE:
             raise PvidError(f"{path}: its base floats (a free joint): only robots on a fixed base are identified")
