@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import click
@@ -28,6 +29,7 @@ from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.filters import compensator
 from pvid.oracle.weak.identify import ready, start_of
+from pvid.oracle.weak.scores import between
 from pvid.rig.columns import Channel, Columns
 from pvid.rig.mechanism_file import parsed_file
 from pvid.rig.run import read_recording, recording_of_arrays
@@ -46,6 +48,13 @@ def _read(text: str | bytes, columns: str | None = None) -> Callable[[Path], Any
         read_recording(path, None, COLUMNS if columns is None else Columns.parse(columns, COLUMNS.channels))
 
     return read
+
+
+def _rows(many: int) -> Any:
+    """A record of one term with so many windows."""
+    channels = SimpleNamespace(rows=[SimpleNamespace(terms=[None])])
+    grid = SimpleNamespace(design=SimpleNamespace(test_functions=None))
+    return SimpleNamespace(channels=channels, grid=grid, rows=lambda *_: np.zeros(many))
 
 
 def _other_topic(folder: Path) -> None:
@@ -143,6 +152,7 @@ CASES: dict[str, Callable[[Path], Any]] = {
     "is not UTF-8 text": _path(b"\xff\xfe\xff"),
     "has no messages": _no_messages,
     "is of another topic than the signals": _other_topic,
+    "the other run has a gap": lambda _: between(_rows(3), _rows(2), np.arange(2), 1e-3),
 }
 
 
