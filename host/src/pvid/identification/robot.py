@@ -14,7 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.base.wording import listed, with_unit
 from pvid.identification.answer import Answer, Factors, Float, Value
-from pvid.identification.bodies import REACHED, Bodies, bodies_of
+from pvid.identification.bodies import Bodies, bodies_of
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.chain import INERTIAL
 from pvid.model.compiled import CompiledModel
@@ -158,7 +158,7 @@ class RobotAnswer(Answer):
         told = (
             [f"no robot has {listed(names[k] for k in low)} below 0: its bodies are those with 0 there"] if low else []
         )
-        if bodies is not None and np.max(np.abs(bodies.off)) > REACHED:
+        if bodies is not None and bodies.impossible:
             worst = int(np.argmax(np.abs(bodies.off)))
             told.append(
                 f"no possible bodies (mass and inertia positive) have all these values: the nearest ones differ by "
@@ -285,14 +285,14 @@ def payload_of(loaded: RobotAnswer, empty: RobotAnswer) -> dict[str, Value]:
     scale = np.linalg.norm(slopes @ inverse @ gains.T, axis=1)
     missing = np.concatenate([_moved(one.fit) for one in (loaded, empty)])[:, own]
     missed = np.linalg.norm(slopes @ inverse @ missing.T, axis=1)
+    dark = np.linalg.norm(slopes @ hidden, axis=1) > _SEEN * np.linalg.norm(slopes * sizes, axis=1)
     error = math.hypot(noise[0], scale[0], missed[0])
     faint = bool(abs(of[0]) < _CLEAR_MASS * error)
-    if of[0] < -_CLEAR_MASS * error:
+    if of[0] < -_CLEAR_MASS * error and not dark[0]:
         raise PvidError(
             f"the payload's mass would be {with_error(float(of[0]), error)[0]} kg: are the recordings with and without "
             "it swapped?"
         )
-    dark = np.linalg.norm(slopes @ hidden, axis=1) > _SEEN * np.linalg.norm(slopes * sizes, axis=1)
     dark[1:] |= dark[0]
     for k, name in enumerate(_PAYLOAD[4:], 4):  # Ixx about the centre contains cy and cz, Ixy cx and cy
         axes = set(name[1:]) if name[1] != name[2] else set("xyz") - {name[1]}
