@@ -86,7 +86,8 @@ def test_a_rotor_is_that_of_the_file() -> None:
     p = np.array([chain.of_file(one) or 0.0 for one in chain.base])
     found = bodies_of(chain, p, np.diag(np.full(len(p), 1e-6)), np.zeros(len(p), np.bool_))
     assert found is not None
-    np.testing.assert_allclose(found.inertial, [one.inertial for one in chain.joints], atol=1e-9)
+    truth = np.array([one.inertial for one in chain.joints], np.float64)
+    np.testing.assert_allclose(found.inertial, truth, atol=1e-9)
 
 
 def test_a_file_that_is_right_stays() -> None:

@@ -67,7 +67,11 @@ def from_file(path: Path, out: Path, joints: tuple[str, ...]) -> int:
 
     if out.suffix != ".py":
         raise PvidError(f"{out}: the name of a model file ends with .py")
-    write_whole(out, model_text(path, listed_names(joints), out.parent))
+    text = model_text(path, listed_names(joints), out.parent)
+    for line in text.splitlines():
+        if line.startswith("# "):
+            write_stderr(f"pvid: note: {line[2:]}")
+    write_whole(out, text)
     compiled = compiled_of(out)
     click.echo(f"{out}: {len(compiled.signals) // 2} joints, {len(compiled.unknowns)} base parameters")
     return DONE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ class Placed:
     ----------
     model, data : MuJoCo's
     speeds, notes : that URDF allows; what was changed
+    bare : names of bodies whose inertia the file does not have
     joints, names : MuJoCo's numbers of those that move, and their names
     before : of each the place of the joint that carries it; -1: the base
     carrier : of each body the place of the joint that moves it; -1: it rests
@@ -47,6 +48,7 @@ class Placed:
     data: Any
     speeds: Mapping[str, float]
     notes: Sequence[str]
+    bare: Collection[str]
     joints: Sequence[int]
     names: Sequence[str]
     before: Sequence[int]
@@ -86,7 +88,7 @@ def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Pla
         (): all
     fused : links of URDF that fixed joints tie are one body
     """
-    mujoco, model, speeds, notes = _read(path, fused=fused)
+    mujoco, model, speeds, notes, bare = _read(path, fused=fused)
     joints = _chosen(mujoco, model, path, chosen)
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr] = 0.0
@@ -101,7 +103,7 @@ def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Pla
     frames = [(data.xanchor[k].copy(), data.xmat[int(model.jnt_bodyid[k])].reshape(3, 3)) for k in joints]
     names = [_names(model)[joint] for joint in joints]
     base = (np.zeros(3), np.eye(3))
-    return Placed(model, data, speeds, notes, joints, names, before, carrier, [*frames, base])
+    return Placed(model, data, speeds, notes, bare, joints, names, before, carrier, [*frames, base])
 
 
 def model_text(path: Path, chosen: Sequence[str] = (), folder: Path | None = None) -> str:
@@ -142,12 +144,15 @@ def model_text(path: Path, chosen: Sequence[str] = (), folder: Path | None = Non
         if model.jnt_actfrclimited[joint] and (most := min(abs(model.jnt_actfrcrange[joint]))) > 0:
             given["torque"] = _number(most)
         first = ", ".join([json.dumps(name), *(f"{key}={value}" for key, value in given.items())])
-        lines += [f"model.joint({first},", f"            inertial={_numbers(robot.inertial(place))})"]
+        own = [model.body(k).name for k in range(model.nbody) if robot.carrier[k] == place]
+        known = not set(own) & set(robot.bare)
+        lines += [f"model.joint({first}{',' if known else ')'}"]
+        lines += [f"            inertial={_numbers(robot.inertial(place))})"] * known
     return "\n".join([*lines, ""])
 
 
-def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float], list[str]]:
-    """MuJoCo, its model of a file, the speeds that URDF allows, and what was changed; what is only drawn is not needed
+def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float], list[str], list[str]]:
+    """MuJoCo, its model of a file, and what `prepared_urdf` returns of URDF; what is only drawn is not needed
     of URDF."""
     try:
         import mujoco
@@ -161,9 +166,10 @@ def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float]
         raise PvidError(f"{path}: is no URDF or MJCF file: {reason(error)}") from None
     speeds: dict[str, float] = {}
     notes: list[str] = []
+    bare: list[str] = []
     if tree.tag == "robot":
         try:
-            speeds, notes = prepared_urdf(tree)
+            speeds, notes, bare = prepared_urdf(tree)
         except ValueError as error:
             raise PvidError(f"{path}: is no URDF file: {printable(reason(error))}") from None
         if not fused:
@@ -183,17 +189,17 @@ def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float]
         raise PvidError(f"{path}: MuJoCo does not read it: {printable(reason(error))}") from None
     finally:
         mujoco.set_mju_user_warning(usual)
-    return mujoco, model, speeds, notes
+    return mujoco, model, speeds, notes, bare
 
 
-def prepared_urdf(tree: ElementTree.Element) -> tuple[dict[str, float], list[str]]:
+def prepared_urdf(tree: ElementTree.Element) -> tuple[dict[str, float], list[str], list[str]]:
     """Makes of a URDF what MuJoCo reads: without what is only drawn, with masses and inertias that bodies can have.
 
     Raises ValueError where a number is none.
 
     Returns
     -------
-    Speeds of joints that have a limit of it, and what was changed.
+    Speeds of joints that have a limit of it, what was changed, and names of moving links without an inertial.
     """
     for link in tree.iter("link"):
         for one in [*link.findall("visual"), *link.findall("collision")]:
@@ -205,12 +211,13 @@ def prepared_urdf(tree: ElementTree.Element) -> tuple[dict[str, float], list[str
     for one in bare:
         ElementTree.SubElement(one, "inertial")
         _made_possible(one)
-    kinds = {"without an inertial, taken as 0": bare, "with an impossible inertia, the nearest is taken": changed}
+    kinds = {"without an inertial": bare, "with an impossible inertia, the nearest is taken": changed}
     notes = [f"{what}: {', '.join(printable(one.get('name', '')) for one in some)}"
              for what, some in kinds.items() if some]  # fmt: skip
     limits = {one.get("name", ""): one.find("limit") for one in tree.findall("joint")}
     speeds = {name: float(one.get("velocity", 0)) for name, one in limits.items() if one is not None}
-    return {name: one for name, one in speeds.items() if math.isfinite(one)}, notes
+    speeds = {name: one for name, one in speeds.items() if math.isfinite(one)}
+    return speeds, notes, [one.get("name", "") for one in bare]
 
 
 def _made_possible(link: ElementTree.Element) -> bool:
@@ -306,7 +313,8 @@ def _refuse_loops(mujoco: Any, model: Any, carrier: Sequence[int], path: Path) -
         if kind == kinds.mjEQ_JOINT:
             both = [model.joint(at).name for at in bodies if at >= 0]
             free = [name for name in map(lambda at: model.joint(at).name, range(model.njnt)) if name not in both]
-            tied = f"; hold {listed(map(printable, both))}: --joints {','.join(map(printable, free))}"
+            tied = f"; hold {listed(map(printable, both))}"
+            tied += f": --joints {','.join(map(printable, free))}" if free else ""
             bodies = [int(model.jnt_bodyid[at]) for at in bodies if at >= 0]
         elif kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or model.eq_objtype[k] != mujoco.mjtObj.mjOBJ_BODY:
             bodies = [0, model.nbody - 1]
