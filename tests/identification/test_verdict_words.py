@@ -7,6 +7,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+import sympy as sp
 from conftest import ROOT
 from lag_plant import DRAG, RATE, K, T, lag, signals
 from rich.console import Console
@@ -21,6 +22,7 @@ from pvid.identification.answer import Analysis
 from pvid.identification.judge import PREDICTED
 from pvid.identification.road import identified
 from pvid.identification.values import values_of
+from pvid.model import Model
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Reason, Verdict, of_width
@@ -118,6 +120,22 @@ def test_identifier_that_judges_as_a_whole_has_the_same_words() -> None:
         "usable",
         "not_identified",
     ]
+
+
+@pytest.mark.parametrize(("share", "se", "known"), [(0.0, 0.08, False), (0.0, 0.002, True), (-1.0, 0.08, True)])
+def test_an_output_depends_on_what_is_lost_beyond_its_slope(share: float, se: float, known: bool) -> None:
+    """r = sqrt(cx^2 + cy^2) has the slope 0 in cx at cx = 0; cx + cy is known where their errors cancel."""
+    model = Model("whirl")
+    x, y = (model.sensor(name, "m", resolution=1e-6) for name in "xy")
+    cx, cy = (model.unknown(name, "1/s^2", 0.1, positive=False, sd=1.0) for name in ("cx", "cy"))
+    model.equation(x.d(2) + cx * y)
+    model.equation(y.d(2) + cy * x)
+    model.output("r", "1/s^2", cx + cy if share else sp.sqrt(cx**2 + cy**2))
+    lost = Judged("not_identified", "cx is lost", has_error=True)
+    own = np.array([[se**2, share * se**2], [share * se**2, se**2 if share else 1e-6]]) + 1e-12 * np.eye(2)
+    compiled, p = model.compiled("whirl"), np.array([1e-4, 0.05])
+    values = values_of(compiled, p, own, np.zeros((0, 2)), [lost, Judged()], Verdict(), of_known=False)
+    assert (values["r"].value is not None) is known
 
 
 def test_an_output_whose_formula_has_no_value_is_not_identified_and_no_nan() -> None:

@@ -112,6 +112,12 @@ def test_the_search_stays_between_low_and_high(bounds: dict[str, float], at: flo
     assert found.judged[0].status == "not_identified" and "bound" in (found.judged[0].reason or "")
 
 
+def test_a_value_far_below_its_guess_is_said_with_the_unit_in_question() -> None:
+    found = identify(cart(), {**run(0), "F": 1e-7 * run(0)["F"]}, RATE, design=DESIGN, start=[1e-7, 1e-7, 1e-5])
+    assert min(found.r2.values()) > 0.9
+    assert found.judged[0].reason == "m would be 1.3e-07 kg, below a millionth of its guess: is that in another unit?"
+
+
 def _with_guess(bounds: dict[str, Any]) -> CompiledModel:
     model = Model("cart")
     x = model.sensor("x", "m", resolution=1e-6)

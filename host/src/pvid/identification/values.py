@@ -81,7 +81,9 @@ def values_of(
         word = worst(verdict.of(model.p_names[k]) for k in own if k not in lost)
         missing = judged[min(lost, key=lambda k: judged[k].has_error)] if lost else Judged()
         if lost and missing.has_error:
-            hardly = math.hypot(np.sqrt(slope @ covariance @ slope), np.linalg.norm(gains @ slope)) <= WIDE * abs(value)
+            whole = covariance + gains.T @ gains
+            most = max(float(np.sqrt(slope @ whole @ slope)), _farthest(model, p, one, lost, whole) / 2)
+            hardly = most <= WIDE * abs(value)
             missing, word = (Judged(), worst([word, "usable"])) if hardly else (missing, word)
         if missing.status == "not_identified":
             slope = np.where([of.status == "not_identified" for of in judged], 0.0, slope)
@@ -98,6 +100,24 @@ def values_of(
     for k, unknown in enumerate(model.unknowns):
         values[unknown.name] = shown(unknown.unit, float(p[k]), np.eye(len(p))[k], judged[k], verdict.of(unknown.name))
     return values
+
+
+def _farthest(model: CompiledModel, p: Float, output: Output, lost: Sequence[int], covariance: Float) -> float:
+    """How far an output moves from p where a lost parameter does, by two standard errors within its bounds, and the
+    others with it, by differences or by factors, whichever it is that the run does not show; inf where it has no value
+    there. Its slope alone is 0 at a minimum."""
+    value, moves = output_at(model, p, output)[0], [0.0]
+    positive = np.array([one.positive for one in model.unknowns])
+    for k in lost:
+        se, (low, high) = math.sqrt(covariance[k, k]), model.unknowns[k].bounds
+        low = max(low, 0.0) if positive[k] else low
+        for end in np.clip([p[k] - 2 * se, p[k] + 2 * se], low, high) if se else ():
+            step = (end - p[k]) * covariance[k] / se**2
+            with np.errstate(all="ignore"):
+                factors = np.where(positive, p * np.exp(step / p), p + step)
+            away = np.abs([output_at(model, moved, output)[0] - value for moved in (p + step, factors)])
+            moves.append(float(np.min(np.where(np.isfinite(away), away, np.inf))))
+    return max(moves)
 
 
 def _root(covariance: Float) -> Float:

@@ -216,6 +216,9 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
                 else f"the standard error of {{}} is {with_unit(se[k], one.unit, 2)}, "
                 f"beside a value of {with_unit(p, one.unit, 2)}"
             )
+            if se[k] <= limit:
+                value = with_unit(p, one.unit, 2)
+                why = f"{{}} would be {value}, below a millionth of its guess: is that in another unit?"
             has_error = not ran_down and bool(np.isfinite(se[k]))
             out.append(Judged("not_identified", why.format(one.name), has_error=has_error))
         elif own_scale and se[k] > UNKNOWN * abs(p):
