@@ -106,6 +106,28 @@ def test_measured_drive_that_acts_less_at_its_peaks_is_named() -> None:
     assert terms_of(one.fit, one.named)[0].text.startswith("i acts as i*(1 - 0.")
 
 
+def test_slow_noisy_sensor_that_is_late_is_named_with_its_delay() -> None:
+    model = Model("tanks")
+    a = model.sensor("a", "K", resolution=0.05, reach=20, driven=True)
+    b, c = (model.sensor(name, "K", resolution=0.05, reach=20) for name in "bc")
+    p, q, r = (model.unknown(name, "1/s", guess) for name, guess in (("p", 2.0), ("q", 1.5), ("r", 1.5)))
+    model.equation(b.d() + p * (b - a) + q * (b - c))
+    model.equation(c.d() + r * (c - b))
+    u = 5 * drive(((1.0, 0.11), (0.8, 0.37), (0.6, 0.9)))
+
+    def slope(x: Float, warm: float) -> Float:
+        return np.array([2.5 * (warm - x[0]) + 1.2 * (x[1] - x[0]), 2.0 * (x[0] - x[1])])
+
+    x = integrated(slope, np.zeros(2), u)
+    late = np.interp(np.arange(SAMPLES) - 15, np.arange(SAMPLES), x[:, 0])
+    run = {"a": measured(u, 0.05, 1), "b": measured(late, 0.05, 2), "c": measured(x[:, 1], 0.05, 3)}
+    one = found(model, run)
+    assert one.named is not None and one.named.complete
+    (text,) = (term.text for term in terms_of(one.fit, one.named))
+    assert text.startswith("b seems to be delayed by 0.03")  # 15 samples: 0.030 s
+    assert found(model, run | {"b": measured(x[:, 0], 0.05, 2)}).verdict.status == "good"
+
+
 def test_curved_sensor_beyond_what_it_can_show_stays_finite() -> None:
     curved = next(act.exact for act in ACTS if act.exact is not None and act.text.startswith("shows"))
     assert curved is not None
