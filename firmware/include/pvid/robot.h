@@ -9,15 +9,21 @@
  * A new spline begins at each knot, so that a joint has one row for each interval between knots. Splines that overlap
  * share noise: the recursion u_k = w_0 x_k + w_1 u_(k-1) + w_2 u_(k-2) + w_3 u_(k-3) makes that of white torques white.
  * Of each joint i, columns that it has alone: S_i = sum u u^T, F_i = sum u e and Q_i = sum e^2 of e = y - u p. A group
- * of rows ends with (sum_i S_i / s_i^2 + prior) dp = sum_i F_i / s_i^2 + prior, s_i^2 = Q_i / rows, by Cholesky, a row
- * of the factor each tick. Then F_i -= S_i dp and Q_i follow p: rounding of S_i acts on dp alone. No window of samples
- * is kept.
+ * of rows ends with (sum_i S_i / s_i^2 + prior) dp = sum_i F_i / s_i^2 + prior, s_i^2 = Q_i / (rows_i - p / n), by
+ * Cholesky, a row of the factor each tick. Then F_i -= S_i dp and Q_i follow p: rounding of S_i acts on dp alone. Where
+ * Q_i falls below 2^-10 of itself the joint's sums begin again at the new p. No window of samples is kept.
  *
  *   static pvid_robot_f32 identifier;
  *   static float memory[ARM_MEMORY];
  *   if (pvid_robot_init_f32(&identifier, &arm_config_f32, memory, ARM_MEMORY) != PVID_OK) ...
  *   each tick:     reason = pvid_robot_step_f32(&identifier, sample);
  *   any context:   if (pvid_robot_read_f32(&identifier, estimate, &number) && (number > 0)) ...
+ *
+ * After the first estimate a row with |e| > 16 s_i is an outlier: it is not used and the splines restart, so that the
+ * sample behind it is in no later row. Four outliers of a joint within 64 of its rows open the gate until as many rows
+ * are accepted: a changed plant is followed. Not caught: a bad sample before the first estimate, while a joint has less
+ * than 2 p / n + 1 rows or its gate is open, one that moves every row by less than 16 s_i, and the rows of the joints
+ * before the one that shows it. What is not caught stays until `memory` rows have passed several times, or init.
  *
  * Never allocates: all that depends on the model is in `memory`, and no PVID_MAX_ size matters. Every input is allowed.
  * Call all functions from one context, except pvid_robot_read_f32. Noise of the encoders in the columns is not
@@ -50,7 +56,7 @@ typedef struct {
     const uint16_t *end;   /* [n] one past the last slot of each joint */
     const uint8_t *column; /* [slots] the parameter of each, ascending within a joint */
     const uint16_t *slot;  /* [entries] to which each result is added */
-    const float *gain;     /* [n] of each recorded torque: 1, or a torque constant */
+    const float *gain;     /* [n] of each recorded torque: 1, or a torque constant; 1e-9..1e9, either sign */
     const bool *held;      /* [n] the torque is held from its sample to the next */
     /* From q [rad, m], v [rad/s, m/s] and the mean of sgn(v) over a step, in[3][n]: out[entries]. */
     void (*values)(const float in[], float out[]);
@@ -66,16 +72,17 @@ typedef struct {
     const float *spline;             /* [4][L] B at the steps, by intervals since its start */
     const float *slope;              /* [4][L] -B' [1/s] */
     const float *torque;             /* [2][4][L D] B / D at the ticks; then half a tick later, of what is held */
-    float white[PVID_ROBOT_SPLINES]; /* w */
+    float white[PVID_ROBOT_SPLINES]; /* w, w_0 in 1e-9..1e9, of a recursion that is stable */
 } pvid_robot_design_f32;
 
 typedef struct {
     const pvid_robot_model_f32 *model;   /* must outlive the identifier, with its tables */
     const pvid_robot_design_f32 *design; /* likewise */
-    const float *start;                  /* [p] first estimate, as of the robot's file */
-    const float *start_sd;               /* [p] its standard deviation, > 0 */
-    uint16_t group;                      /* rows of a joint between two estimates */
-    uint32_t memory; /* rows of a joint, at least 2 p: as many count in full, older ones half each time */
+    const float *start;                  /* [p] first estimate, as of the robot's file, within 1e9 */
+    const float *start_sd;               /* [p] its standard deviation, 1e-9..1e9 */
+    uint16_t group; /* accepted rows of a joint, in the mean of the joints, between two estimates: 1..65535, of which an
+                       estimate, 3 n + 2 p + 3 free ticks, needs some */
+    uint32_t memory; /* rows of a joint, 8 p..2^20: as many count in full, older ones half each time */
 } pvid_robot_config_f32;
 
 /* Places in `memory`. */
@@ -104,17 +111,19 @@ typedef struct {
     float *memory;
     pvid_robot_places at;
     pvid_publication_mark mark;
-    float q[PVID_ROBOT_JOINTS]; /* Q_i */
-    uint32_t rows;              /* of each joint, in S_i */
-    uint32_t rejected;          /* samples that were not finite */
-    uint32_t saturated;         /* rows of a joint beyond 1e9 */
-    uint32_t singular;          /* groups whose system could not be solved */
-    uint32_t number;            /* of estimates */
+    float q[PVID_ROBOT_JOINTS];        /* Q_i */
+    uint32_t rows[PVID_ROBOT_JOINTS];  /* accepted, in S_i */
+    uint32_t doubt[PVID_ROBOT_JOINTS]; /* 16 for each outlier, less 1 for each accepted row */
+    uint32_t rejected;                 /* samples that were not finite, or beyond their range */
+    uint32_t saturated;                /* rows beyond 1e9 */
+    uint32_t outliers;                 /* rows of a joint */
+    uint32_t held;                     /* groups without an estimate */
+    uint32_t number;                   /* of estimates */
+    uint32_t since;                    /* accepted rows of all joints since the last group */
     uint16_t slots;
     uint16_t filled; /* samples in the ring, at most `taps` */
     uint16_t place;  /* of the next one */
     uint16_t tick;   /* in the interval */
-    uint16_t since;  /* rows since the last group */
     uint8_t spline;  /* the youngest one, of 4 */
     uint8_t young;   /* intervals until a spline has been added from its start on */
     uint8_t latest;  /* place of the latest white rows, of 3 */
@@ -126,25 +135,30 @@ typedef struct {
     bool factor;       /* m contains the factor of the latest estimate */
 } pvid_robot_f32;
 
-/* Floats of `memory` that a robot and a design need. */
+/* Floats of `memory` that a robot and a design need; 0 where init refuses one of the two. */
 uint32_t pvid_robot_memory_f32(const pvid_robot_model_f32 *model, const pvid_robot_design_f32 *design);
 
 /* Initialises `self`. *config is copied; what it points to, and memory[room], must outlive the identifier. Fails iff
- *   - a pointer is NULL (PVID_BAD_POINTER), or room is below pvid_robot_memory_f32 (PVID_BAD_LAYOUT),
- *   - a count of the model is out of its range, or a slot or column is (PVID_BAD_MODEL),
- *   - a count of the design is out of its range, or a table is not finite (PVID_BAD_DESIGN),
+ *   - self, config, its model or design, or memory is NULL (PVID_BAD_POINTER); a NULL inside has the status of what it
+ *     belongs to; room is below pvid_robot_memory_f32 (PVID_BAD_LAYOUT),
+ *   - a count of the model is out of its range, or a slot, a column or a gain is (PVID_BAD_MODEL),
+ *   - a count of the design is out of its range, a table beyond 1e9 or not finite, or `white` as it says
+ *     (PVID_BAD_DESIGN),
  *   - an interval has too few ticks for the rows of all joints, or a group too few for an estimate (PVID_BAD_WINDOW),
  * or
- *   - start is not finite (PVID_BAD_START), start_sd not in 1e-9..1e9 (PVID_BAD_START_SD), memory is below 2 p or above
- *     2^20 (PVID_BAD_FORGETTING). */
+ *   - start is out of its range (PVID_BAD_START), start_sd (PVID_BAD_START_SD) or memory (PVID_BAD_FORGETTING). */
 pvid_status pvid_robot_init_f32(pvid_robot_f32 *self, const pvid_robot_config_f32 *config, float memory[],
                                 uint32_t room);
 
 /* One tick: sample[2 n] = q_1 .. q_n [rad, m], then torques (or currents) of the same instant. Returns
- *   - PVID_WARMING_UP until the first row, PVID_REJECTED_NOT_FINITE for a sample that is not, which restarts the
- * splines,
- *   - PVID_UPDATED at the tick of a new estimate, PVID_HELD_SINGULAR where a direction has no information,
- *   - PVID_REJECTED_SATURATED for a row beyond 1e9, PVID_NOT_READY before init, else PVID_ACCUMULATED. */
+ *   - PVID_WARMING_UP until the first row, and while the polynomials fill after a restart,
+ *   - PVID_REJECTED_NOT_FINITE for a sample that is not, PVID_REJECTED_SATURATED for |q| > 16384 or a torque beyond
+ * 1e9, or a row beyond 1e9, PVID_REJECTED_OUTLIER for a row: each restarts the splines,
+ *   - PVID_UPDATED at the tick of a new estimate,
+ *   - PVID_HELD_UNCERTAIN in its place while a standard error is not below half its start_sd: motion or time is
+ * missing,
+ *   - PVID_HELD_SINGULAR where the system has no solution in float32 within 1e9,
+ *   - PVID_NOT_READY before init, else PVID_ACCUMULATED. */
 pvid_reason pvid_robot_step_f32(pvid_robot_f32 *self, const float sample[]);
 
 /* Samples are missing: the splines restart, the sums are kept. */
@@ -154,8 +168,9 @@ void pvid_robot_gap_f32(pvid_robot_f32 *self);
  * Fails iff an estimate was published during each of PVID_READ_ATTEMPTS attempts, or `self` is not initialised. */
 bool pvid_robot_read_f32(const pvid_robot_f32 *self, float estimate[], uint32_t *number);
 
-/* Column k of the covariance of the latest estimate, out[p]. Fails iff `self` is not initialised, there is no k, or an
- * estimate is being computed: call it at the tick of PVID_UPDATED, or soon after. Cost: p^2 multiplications. */
+/* Column k of the covariance of the latest estimate, out[p]. Fails iff `self` is not initialised, there is no k, or a
+ * group has begun since, until the next PVID_UPDATED: call it at that tick, or soon after. Cost: p^2 multiplications.
+ */
 bool pvid_robot_covariance_f32(const pvid_robot_f32 *self, uint8_t k, float out[]);
 
 /* FNV-1a, continued from `hash`, of p, its standard errors, F, Q and a reason: equal on every computer. */

@@ -13,10 +13,16 @@
 #include "pvid/fnv_word.h"
 
 #define SPLINES PVID_ROBOT_SPLINES
-#define PAST 3u          /* white rows that the next one needs */
-#define ROW_LIMIT 1.0e9f /* of an entry of a row */
-#define PIVOT 1.0e-6f    /* of the diagonal */
-#define LEAST_Q 1.0e-30f /* of Q_i */
+#define PAST 3u               /* white rows that the next one needs */
+#define ROW_LIMIT 1.0e9f      /* of an entry of a row, a torque, a parameter, a table */
+#define PIVOT 1.0e-6f         /* of the diagonal */
+#define LARGEST 3.4028235e38f /* of float32 */
+#define LEAST_Q 1.0e-30f      /* of Q_i */
+#define GATE 256.0f           /* e^2 of an outlier, times s_i^2 */
+#define DOUBT 16u             /* accepted rows that outweigh an outlier */
+#define OPEN 64u              /* doubt from which the gate lets all pass */
+#define FALL 9.765625e-4f     /* of Q_i, beyond which it is rounding */
+#define KNOWN 0.5f            /* standard error of a known parameter, of that of the start */
 #define MOST_TAPS 1024u
 #define MOST_ROWS 1048576u
 #define MOST_TICKS 65535u /* of an interval */
@@ -69,31 +75,25 @@ static uint32_t places(const pvid_robot_model_f32 *model, const pvid_robot_desig
     return self->at.end;
 }
 
-PVID_COLD uint32_t pvid_robot_memory_f32(const pvid_robot_model_f32 *model, const pvid_robot_design_f32 *design)
+static bool are_within(const float x[], uint32_t n, float limit)
 {
-    pvid_robot_f32 none;
-    return places(model, design, &none);
-}
-
-static bool are_finite(const float x[], uint32_t n)
-{
-    bool finite = x != NULL;
-    for (uint32_t i = 0; finite && (i < n); i++) {
-        finite = pvid_finite_f32(x[i]);
+    bool within = x != NULL;
+    for (uint32_t i = 0; within && (i < n); i++) {
+        within = pvid_magnitude_f32(x[i]) <= limit; /* NaN fails the comparison */
     }
-    return finite;
+    return within;
 }
 
 static bool model_is_valid(const pvid_robot_model_f32 *model)
 {
     if ((model->joints < 1u) || (model->joints > PVID_ROBOT_JOINTS) || (model->p < 1u) || (model->p > PVID_ROBOT_P) ||
         (model->entries < 1u) || (model->forces > model->entries) || (model->end == NULL) || (model->column == NULL) ||
-        (model->slot == NULL) || (model->held == NULL) || (model->values == NULL) ||
-        !are_finite(model->gain, model->joints)) {
+        (model->slot == NULL) || (model->held == NULL) || (model->values == NULL) || (model->gain == NULL)) {
         return false;
     }
     bool valid = true;
     for (uint8_t j = 0; j < model->joints; j++) {
+        valid = valid && pvid_within_f32(pvid_magnitude_f32(model->gain[j]), 1.0e-9f, ROW_LIMIT);
         const uint16_t first = first_of(model, j);
         valid = valid && (model->end[j] >= first) && ((uint32_t)model->end[j] <= ((uint32_t)first + model->p));
         for (uint16_t i = first; valid && (i < model->end[j]); i++) {
@@ -106,15 +106,33 @@ static bool model_is_valid(const pvid_robot_model_f32 *model)
     return valid;
 }
 
+/* w_0 > 0, and the recursion forgets: all zeros of z^3 - w_1 z^2 - w_2 z - w_3 are within the unit circle (Jury). */
+static bool white_is_stable(const float w[])
+{
+    const float a = w[1];
+    const float b = w[2];
+    const float c = w[3];
+    return pvid_within_f32(w[0], 1.0e-9f, ROW_LIMIT) && (pvid_magnitude_f32(c) < 1.0f) && (((1.0f - a) - b) > c) &&
+           (((1.0f + a) - b) > -c) && (pvid_magnitude_f32(b + (a * c)) < (1.0f - (c * c)));
+}
+
 static bool design_is_valid(const pvid_robot_design_f32 *design)
 {
     const uint32_t ticks = (uint32_t)design->interval * design->decimation;
     return (design->taps >= 3u) && ((design->taps % 2u) == 1u) && (design->taps <= MOST_TAPS) &&
            (design->interval >= 3u) && (ticks >= 3u) && (ticks <= MOST_TICKS) &&
-           are_finite(design->position, design->taps / 2u) && are_finite(design->rate, design->taps / 2u) &&
-           are_finite(design->spline, SPLINES * design->interval) &&
-           are_finite(design->slope, SPLINES * design->interval) && are_finite(design->torque, 2u * SPLINES * ticks) &&
-           are_finite(design->white, SPLINES);
+           are_within(design->position, design->taps / 2u, ROW_LIMIT) &&
+           are_within(design->rate, design->taps / 2u, ROW_LIMIT) &&
+           are_within(design->spline, SPLINES * design->interval, ROW_LIMIT) &&
+           are_within(design->slope, SPLINES * design->interval, ROW_LIMIT) &&
+           are_within(design->torque, 2u * SPLINES * ticks, ROW_LIMIT) && white_is_stable(design->white);
+}
+
+PVID_COLD uint32_t pvid_robot_memory_f32(const pvid_robot_model_f32 *model, const pvid_robot_design_f32 *design)
+{
+    pvid_robot_f32 none;
+    const bool valid = (model != NULL) && (design != NULL) && model_is_valid(model) && design_is_valid(design);
+    return valid ? places(model, design, &none) : 0u;
 }
 
 /* Ticks of an interval that add the row of a joint or do a stage of an estimate: none of those that compute values or
@@ -142,7 +160,7 @@ static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *co
     if ((left <= (model->joints + 1u)) || ((config->group * (left - model->joints - 1u)) < stages)) {
         return PVID_BAD_WINDOW;
     }
-    if (!are_finite(config->start, model->p)) {
+    if (!are_within(config->start, model->p, ROW_LIMIT)) {
         return PVID_BAD_START;
     }
     bool positive = config->start_sd != NULL;
@@ -152,7 +170,7 @@ static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *co
     if (!positive) {
         return PVID_BAD_START_SD;
     }
-    if ((config->memory < (2u * (uint32_t)model->p)) || (config->memory > MOST_ROWS)) {
+    if ((config->memory < (8u * (uint32_t)model->p)) || (config->memory > MOST_ROWS)) {
         return PVID_BAD_FORGETTING;
     }
     memset(self, 0, sizeof *self);
@@ -326,6 +344,19 @@ static void end_interval(pvid_robot_f32 *self)
 
 /* ---- rows ---- */
 
+/* Rows of a joint in excess of its share of the parameters. */
+static float free_rows(const pvid_robot_f32 *self, uint8_t joint)
+{
+    return (float)self->rows[joint] - ((float)self->config.model->p / (float)self->config.model->joints);
+}
+
+/* Enough rows of a joint for s_i^2: free_rows is 1 at least. */
+static bool has_rows(const pvid_robot_f32 *self, uint8_t joint)
+{
+    const uint32_t n = self->config.model->joints;
+    return (self->rows[joint] * n) >= ((2u * (uint32_t)self->config.model->p) + n);
+}
+
 static pvid_reason add_row(pvid_robot_f32 *self)
 {
     const pvid_robot_model_f32 *model = self->config.model;
@@ -338,10 +369,6 @@ static pvid_reason add_row(pvid_robot_f32 *self)
     float *f = &self->memory[self->at.f + first];
     const float y = u[((uint32_t)self->slots + joint) - first];
     self->row++;
-    if (joint == 0u) {
-        self->rows++;
-        self->since++;
-    }
     float e = y;
     bool fits = pvid_magnitude_f32(y) <= ROW_LIMIT; /* NaN fails the comparison */
     for (uint32_t i = 0; i < n; i++) {
@@ -352,6 +379,15 @@ static pvid_reason add_row(pvid_robot_f32 *self)
         pvid_count_up(&self->saturated);
         return PVID_REJECTED_SATURATED;
     }
+    if ((self->number > 0u) && has_rows(self, joint) && (self->doubt[joint] < OPEN) &&
+        ((e * e * free_rows(self, joint)) > (GATE * self->q[joint]))) {
+        self->doubt[joint] += DOUBT;
+        pvid_count_up(&self->outliers);
+        return PVID_REJECTED_OUTLIER;
+    }
+    self->doubt[joint] -= (self->doubt[joint] > 0u) ? 1u : 0u;
+    self->rows[joint]++;
+    self->since++;
     for (uint32_t i = 0; i < n; i++) {
         const float x = u[i];
         PVID_UNROLL_BY_FOUR
@@ -367,19 +403,21 @@ static pvid_reason add_row(pvid_robot_f32 *self)
 
 /* ---- the estimate, a stage a tick ---- */
 
-/* Older rows count half. */
-static void forget(pvid_robot_f32 *self, uint8_t joint)
+/* All rows of a joint count less. */
+static void forget(pvid_robot_f32 *self, uint8_t joint, float by)
 {
     const pvid_robot_model_f32 *model = self->config.model;
     float *memory = self->memory;
     const uint32_t end = before(model, (uint8_t)(joint + 1u));
     for (uint32_t i = before(model, joint); i < end; i++) {
-        memory[self->at.s + i] *= 0.5f;
+        memory[self->at.s + i] *= by;
     }
     for (uint32_t i = first_of(model, joint); i < model->end[joint]; i++) {
-        memory[self->at.f + i] *= 0.5f;
+        memory[self->at.f + i] *= by;
     }
-    self->q[joint] *= 0.5f;
+    self->q[joint] *= by;
+    const float rows = by * (float)self->rows[joint];
+    self->rows[joint] = (uint32_t)rows;
 }
 
 /* M and the right side: those of the start, then joint by joint. */
@@ -397,8 +435,7 @@ static void assemble(pvid_robot_f32 *self, uint8_t joint)
             memory[self->at.z + k] = weight * (self->config.start[k] - memory[self->at.p + k]);
         }
     }
-    const float free = (float)self->rows - ((float)model->p / (float)model->joints);
-    const float weight = free / ((self->q[joint] > LEAST_Q) ? self->q[joint] : LEAST_Q);
+    const float weight = free_rows(self, joint) / ((self->q[joint] > LEAST_Q) ? self->q[joint] : LEAST_Q);
     const uint16_t first = first_of(model, joint);
     const float *s = &memory[self->at.s + before(model, joint)];
     for (uint32_t i = first; i < model->end[joint]; i++) {
@@ -464,7 +501,7 @@ static void unit_forward(const float m[], float z[], uint32_t k, uint32_t n)
     }
 }
 
-/* F and Q of a joint at p + delta. */
+/* F and Q of a joint at p + delta. Where Q is the rounding of a far larger one, the joint begins again there. */
 static void correct(pvid_robot_f32 *self, uint8_t joint)
 {
     const pvid_robot_model_f32 *model = self->config.model;
@@ -493,11 +530,15 @@ static void correct(pvid_robot_f32 *self, uint8_t joint)
         change -= d[i] * f[i];
     }
     const float q = self->q[joint] + change;
-    self->q[joint] = (q > LEAST_Q) ? q : LEAST_Q;
+    const bool cancelled = q < (FALL * self->q[joint]);
+    self->q[joint] = q;
+    if (cancelled) {
+        forget(self, joint, 0.0f);
+    }
     self->corrected = (uint8_t)(joint + 1u);
 }
 
-/* p + delta; false: it is not finite. */
+/* p + delta; false: it is beyond its limit. */
 static bool take_delta(pvid_robot_f32 *self)
 {
     const uint32_t n = self->config.model->p;
@@ -507,7 +548,7 @@ static bool take_delta(pvid_robot_f32 *self)
     for (uint32_t k = 0; k < n; k++) {
         memory[self->at.next + k] = memory[self->at.p + k] + memory[self->at.delta + k];
     }
-    return are_finite(&memory[self->at.next], n);
+    return are_within(&memory[self->at.next], n, ROW_LIMIT);
 }
 
 static void publish(pvid_robot_f32 *self)
@@ -527,13 +568,14 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
     float *memory = self->memory;
     const uint8_t i = self->index;
     uint32_t all = 1; /* of the stage */
-    bool solved = true;
+    pvid_reason held = PVID_ACCUMULATED;
     pvid_reason reason = PVID_ACCUMULATED;
     switch (self->stage) {
     case FORGET:
         all = self->config.model->joints;
-        forget(self, i);
-        self->rows -= ((i + 1u) == all) ? (self->rows / 2u) : 0u;
+        if (self->rows[i] >= self->config.memory) {
+            forget(self, i, 0.5f);
+        }
         break;
     case ASSEMBLE:
         all = self->config.model->joints;
@@ -542,10 +584,10 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
         break;
     case FACTOR:
         all = n;
-        solved = factor_row(&memory[self->at.m], &memory[self->at.z], i);
+        held = factor_row(&memory[self->at.m], &memory[self->at.z], i) ? PVID_ACCUMULATED : PVID_HELD_SINGULAR;
         break;
     case BACKWARD:
-        solved = take_delta(self);
+        held = take_delta(self) ? PVID_ACCUMULATED : PVID_HELD_SINGULAR;
         break;
     case CORRECT:
         all = self->config.model->joints;
@@ -559,6 +601,8 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
         all = n;
         unit_forward(&memory[self->at.m], &memory[self->at.z], i, n);
         memory[self->at.fresh + n + i] = sqrtf(product(&memory[self->at.z + i], &memory[self->at.z + i], n - i));
+        held = (memory[self->at.fresh + n + i] < (KNOWN * self->config.start_sd[i])) ? PVID_ACCUMULATED
+                                                                                     : PVID_HELD_UNCERTAIN;
         break;
     case PUBLISH:
         self->factor = true;
@@ -569,10 +613,10 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
         break;
     }
     self->index = (uint8_t)(i + 1u);
-    if (!solved) {
-        pvid_count_up(&self->singular);
+    if (held != PVID_ACCUMULATED) {
+        pvid_count_up(&self->held);
         self->stage = IDLE;
-        return PVID_HELD_SINGULAR;
+        return held;
     }
     if (self->index >= all) {
         self->index = 0;
@@ -588,14 +632,19 @@ static pvid_reason do_task(pvid_robot_f32 *self)
     if (self->row < model->joints) {
         return add_row(self);
     }
-    if ((self->stage == IDLE) && (self->since >= self->config.group) &&
-        ((self->rows * model->joints) >= (2u * (uint32_t)model->p))) {
+    if (self->stage != IDLE) {
+        return do_stage(self);
+    }
+    bool enough = self->since >= ((uint32_t)self->config.group * model->joints);
+    for (uint8_t j = 0; enough && (j < model->joints); j++) {
+        enough = has_rows(self, j);
+    }
+    if (enough) {
         self->since = 0;
         self->index = 0;
-        self->stage = (self->rows >= self->config.memory) ? FORGET : ASSEMBLE;
-        return PVID_ACCUMULATED;
+        self->stage = FORGET;
     }
-    return (self->stage == IDLE) ? PVID_ACCUMULATED : do_stage(self);
+    return PVID_ACCUMULATED;
 }
 
 pvid_reason pvid_robot_step_f32(pvid_robot_f32 *self, const float sample[])
@@ -605,10 +654,10 @@ pvid_reason pvid_robot_step_f32(pvid_robot_f32 *self, const float sample[])
     }
     const pvid_robot_design_f32 *design = self->config.design;
     const uint32_t n = self->config.model->joints;
-    if (!are_finite(sample, 2u * n)) {
+    if (!are_within(sample, n, PVID_ANGLE_LIMIT_F32) || !are_within(&sample[n], n, ROW_LIMIT)) {
         pvid_count_up(&self->rejected);
         pvid_robot_gap_f32(self);
-        return PVID_REJECTED_NOT_FINITE;
+        return are_within(sample, 2u * n, LARGEST) ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
     }
     for (uint32_t i = 0; i < (2u * n); i++) {
         float *ring = &self->memory[self->at.ring + (2u * i * design->taps)];
@@ -632,13 +681,17 @@ pvid_reason pvid_robot_step_f32(pvid_robot_f32 *self, const float sample[])
         add_values(self);
     }
     const bool is_free = (last > 1u) ? (within > 1u) : (within == last);
-    pvid_reason reason = is_free ? do_task(self) : PVID_ACCUMULATED;
+    const pvid_reason reason = is_free ? do_task(self) : PVID_ACCUMULATED;
     self->tick++;
-    if (self->tick == ((uint32_t)design->interval * design->decimation)) {
+    if ((reason == PVID_REJECTED_OUTLIER) || (reason == PVID_REJECTED_SATURATED)) {
+        pvid_robot_gap_f32(self);
+    } else if (self->tick == ((uint32_t)design->interval * design->decimation)) {
         self->tick = 0;
         end_interval(self);
+    } else {
+        /* an interval goes on */
     }
-    return ((reason == PVID_ACCUMULATED) && (self->rows == 0u)) ? PVID_WARMING_UP : reason;
+    return ((reason == PVID_ACCUMULATED) && (self->number == 0u) && (self->rows[0] == 0u)) ? PVID_WARMING_UP : reason;
 }
 
 /* ---- results ---- */
