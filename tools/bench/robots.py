@@ -203,8 +203,8 @@ def row(name: str, place: Path, seeds: int, advance: Advance) -> tuple[list[str]
     score = np.abs(np.array(scores))
     inside = [f"{100 * float(np.mean(score[..., k] < 2)):.1f}" for k in (0, 1)]
     counted = [f"{np.median(cpu):.1f}", f"{answered} of {seeds}", f"{lost}"]
-    sizes = [f"{np.median(ratio):.2f}", f"{ratio.max():.2f}", *inside, f"{score[..., 1].max():.1f}", f"{warned}"]
-    return [*head, *counted, *sizes], faults
+    shown = [f"{np.median(ratio):.2f}", f"{ratio.max():.2f}", *inside, f"{score[..., 1].max():.1f}", f"{warned}"]
+    return [*head, *counted, *shown], faults
 
 
 def _compiled(out: Path, path: Path, joints: Sequence[str]) -> tuple[CompiledModel, Chain]:
