@@ -52,7 +52,8 @@ def option(name: str | list[str], default: Any, about: str = "", least: int = 1,
 def chosen(
     given: Collection[str], usual: Sequence[str] = (), what: str = "mechanism", among: Sequence[str] = ()
 ) -> tuple[str, ...]:
-    """Those of a case, among all mechanisms unless told; (): those that are usual for it, or all.
+    """Those of a case, among all mechanisms unless told; empty: those that are usual
+    for it, or all; frozenset(): none.
 
     Raises PvidError when there is none of a name.
     """
@@ -62,7 +63,7 @@ def chosen(
         among = names()
     if unknown := set(given) - set(among):
         raise PvidError(f"no such {what}: {', '.join(sorted(unknown))}; there are {', '.join(among)}")
-    return tuple(given or usual or among)
+    return tuple(given if given or isinstance(given, frozenset) else usual or among)
 
 
 @dataclass(frozen=True)
