@@ -33,6 +33,13 @@ typedef struct {
  */
 void pvid_standing_skip(pvid_standing_judge *self, bool rejected, uint16_t age_max);
 
+/* Of the ticks since windows were counted last, those that are not in the age, behind a window of `window` ticks that
+ * is, or that was published. */
+static inline uint32_t pvid_standing_uncounted(const pvid_standing_judge *self, uint32_t ticks, uint32_t window)
+{
+    return ((self->now.age > 0u) && (ticks > window)) ? (ticks - window) : 0u;
+}
+
 /* Behind a window that is used, and was compared (contradicts, grew). Returns whether p is trusted as a start: eight
  * valid publications in a row. */
 bool pvid_standing_take(pvid_standing_judge *self, const pvid_standing_window *window);

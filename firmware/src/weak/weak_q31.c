@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "judge/publication.h"
+#include "judge/standing.h"
 #include "number/count.h"
 #include "number/init.h"
 #include "number/integer_q31.h"
@@ -58,8 +59,7 @@ static inline uint32_t ticks_of_window(const pvid_weak_q31 *self)
 /* Behind a window that is in the age, or was published. */
 static void count_window(pvid_weak_q31 *self)
 {
-    const uint32_t window = ticks_of_window(self);
-    self->ticks = ((self->trust.standing.now.age > 0u) && (self->ticks > window)) ? (self->ticks - window) : 0u;
+    self->ticks = pvid_standing_uncounted(&self->trust.standing, self->ticks, ticks_of_window(self));
 }
 
 /* A restart: the ticks that no window has counted make the estimate older, and so does the one that is missing. */
