@@ -8,7 +8,7 @@ import pytest
 import robot_arms
 from robot_arms import Float
 
-from pvid.identification.bodies import REACHED, bodies_of, pseudo_inertias
+from pvid.identification.bodies import REACHED, bodies_of, inertial_of, pseudo_inertias
 from pvid.identification.robot import answer_of_robot
 from pvid.model import Robot
 from pvid.model.chain import INERTIAL, Chain
@@ -22,8 +22,7 @@ def off_file(chain: Chain, seed: int, size: float = 0.15) -> Chain:
         root = np.linalg.cholesky(pseudo_inertias(np.array([joint.inertial]))[0])
         root = root @ (np.eye(4) + size * random.normal(size=(4, 4)))
         j = root @ root.T
-        about = np.trace(j[:3, :3]) * np.eye(3) - j[:3, :3]
-        joints.append(replace(joint, inertial=(j[3, 3], *j[:3, 3], *about[np.triu_indices(3)])))
+        joints.append(replace(joint, inertial=tuple(inertial_of(j))))
     return replace(chain, joints=tuple(joints))
 
 

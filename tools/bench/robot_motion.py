@@ -17,6 +17,7 @@ import numpy.typing as npt
 from bench.case import Advance, Report, columns
 from pvid.base.errors import PvidError
 from pvid.configuration.robot_motion import Series, designed_motion, simple_drives
+from pvid.identification.bodies import about_centre, pseudo_inertias
 from pvid.model import Robot
 from pvid.model.chain import Chain, Joint, rotation_of
 from pvid.model.compiled import CompiledModel
@@ -73,10 +74,7 @@ class Judge:
             above = bodies[joint.parent] if joint.parent >= 0 else spec.worldbody
             quaternion, turned = np.zeros(4), np.array(joint.turned)
             mujoco.mju_mat2Quat(quaternion, turned.reshape(-1))
-            mass, *rest = joint.inertial or ()
-            centre, about = np.array(rest[:3]) / mass, np.zeros((3, 3))
-            about[np.triu_indices(3)] = rest[3:]
-            about = about + np.triu(about, 1).T - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+            mass, centre, about = about_centre(pseudo_inertias(np.array([joint.inertial]))[0])
             body = above.add_body(pos=joint.origin, quat=quaternion, mass=mass, ipos=centre, explicitinertial=True,
                                   fullinertia=about[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)])  # fmt: skip
             body.add_joint(axis=joint.axis)

@@ -23,10 +23,10 @@ from bench.case import Advance, Report, columns
 from pvid.base.errors import PvidError
 from pvid.configuration.robot_motion import Motion, Task, designed_motion
 from pvid.core.sources import ROOT
+from pvid.identification.bodies import about_centre
 from pvid.identification.robot import RobotAnswer, answer_of_robot
 from pvid.model.chain import Chain
 from pvid.model.compiled import CompiledModel
-from pvid.model.operations import evaluated
 from pvid.models.mechanisms import compiled_of
 from pvid.models.robot_file import model_text, prepared_urdf
 from pvid.rig.run import Recording
@@ -91,9 +91,7 @@ def changed(path: Path, joints: Sequence[str], chain: Chain, random: np.random.G
         drawn = SPREAD * random.normal(size=(4, 4))
         logs, own = np.linalg.eigh((drawn + drawn.T) / 2)
         pseudo = root @ (own * np.exp(logs)) @ own.T @ root.T
-        mass, centre = pseudo[3, 3], pseudo[:3, 3] / pseudo[3, 3]
-        second = pseudo[:3, :3] - mass * np.outer(centre, centre)
-        about = np.trace(second) * np.eye(3) - second
+        mass, centre, about = about_centre(pseudo)
         body.mass, body.ipos, body.iquat, body.explicitinertial = mass, centre, [1, 0, 0, 0], True
         body.inertia, body.fullinertia = [0, 0, 0], about[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
     for known in chain.joints:
@@ -136,10 +134,9 @@ def moved(spec: Any, motion: Motion) -> tuple[Float, Float, Float, Float]:
 
 def bound(motion: Motion, q: Float, v: Float, a: Float, noise: Float) -> Float:
     """Cramer-Rao bound of one who knows the motion exactly [p]."""
-    task, every, tiny = Task(motion.model, motion.series, noise), 4, 1e-30
+    task, every = Task(motion.model, motion.series, noise), 4
     q, v, a = (one[:, ::every] for one in (q, v, a))
-    found = [np.broadcast_to(one, q.shape[1]) for one in
-             evaluated(task.program, [*(q + 1j * tiny * v), *(v + 1j * tiny * a)])]  # fmt: skip
+    found = [np.broadcast_to(one, q.shape[1]) for one in task.values(q, v, a)]
     white = task.rows(q, v, found) / noise[:, None, None]
     flat = white.transpose(1, 0, 2).reshape(white.shape[1], -1)
     size = np.linalg.norm(flat, axis=1)

@@ -225,7 +225,7 @@ static void weights_of(uint32_t youngest, const float table[], uint32_t length, 
     }
 }
 
-/* The last samples of a signal, oldest first: each stands in its ring twice. */
+/* The last samples of a signal, oldest first: the ring contains each of them twice. */
 static inline const float *window_of(const pvid_robot_f32 *self, uint32_t signal)
 {
     return &self->memory[self->at.ring + (2u * signal * self->config.design->taps) + self->place];

@@ -66,8 +66,7 @@ class StrongBoard(FloatBoard):
         whole = recording.whole()
         compiled = rig.compiled()
         if reference is None:
-            found = attempted(lambda: identify(compiled, whole.run, whole.sample_rate))
-            reference = None if found is None else reference_of(found)
+            reference = reference_of(attempted(lambda: identify(compiled, whole.run, whole.sample_rate)))
         made = strong_design(compiled, whole, reference=reference)
         return cls(rig, compiled, made.config, made.samples[:MOST_TICKS], made.strong)
 

@@ -63,15 +63,14 @@ def from_file(path: Path, out: Path, joints: tuple[str, ...]) -> int:
     """
     from pvid.base.atomic_write import write_whole
     from pvid.models.mechanisms import compiled_of
-    from pvid.models.robot_file import model_text
+    from pvid.models.robot_file import placed, text_of
 
     if out.suffix != ".py":
         raise PvidError(f"{out}: the name of a model file ends with .py")
-    text = model_text(path, listed_names(joints), out.parent)
-    for line in text.splitlines():
-        if line.startswith("# "):
-            write_stderr(f"pvid: note: {line[2:]}")
-    write_whole(out, text)
+    robot = placed(path, listed_names(joints))
+    for note in robot.notes:
+        write_stderr(f"pvid: note: {note}")
+    write_whole(out, text_of(robot, path, out.parent))
     compiled = compiled_of(out)
     click.echo(f"{out}: {len(compiled.signals) // 2} joints, {len(compiled.unknowns)} base parameters")
     return DONE
@@ -335,7 +334,7 @@ def _strong_design_of(
     from pvid.rig.run import Recording
     from pvid.sim.simulated_run import simulation_of
 
-    reference = None if found is None else reference_of(found)
+    reference = reference_of(found)
     if recording is None:
         if model not in names_of_shipped():
             return None, None, None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import sympy as sp
@@ -82,6 +82,13 @@ def initialised(declaration: str, fields: Mapping[str, object]) -> str:
     """A constant struct of these fields."""
     lines = [f"    .{name} = {value}," for name, value in fields.items()]
     return "\n".join([f"{declaration} = {{", *lines, "};"])
+
+
+def array(kind: str, name: str, values: Iterable[object], width: int) -> str:
+    """A constant array, with so many values a line; "" of none."""
+    given = [str(one) for one in values]
+    rows = [f"    {', '.join(given[k : k + width])}," for k in range(0, len(given), width)]
+    return "\n".join([f"static const {kind} {name}[{len(given)}] = {{", *rows, "};"]) if given else ""
 
 
 def table(kind: str, name: str, size: str, entries: list[str]) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pvid.codegen.c_text import banner
 from pvid.codegen.generated import GeneratedModel
 
 COMPILE_OPTIONS = "-ffp-contract=off -fno-fast-math -fno-delete-null-pointer-checks"  # as PvidCompile.cmake
-_CMAKE = """\
+_TARGET = """\
 # {banner}
 #
 # In your own CMakeLists.txt, behind what provides pvid::pvid (add_subdirectory, FetchContent or find_package):
@@ -28,7 +30,9 @@ set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_E
 if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
   target_compile_options({name} PRIVATE {options})
 endif()
+"""
 
+_CMAKE = """
 # {name}_strong.h, an identifier from derivatives of the signals: includes strong/strong_f32.h of pvid's sources; and
 # {name}_strong_q31.h, the same with integers only, with the formats of a rig.
 option({upper}_STRONG "Build the strong form of {name}" OFF)
@@ -83,15 +87,18 @@ endif()
 """
 
 
+def target(name: str, banner: Sequence[str], sources: Sequence[str]) -> str:
+    """The head of CMakeLists.txt, and the target of these files; it can be a project of its own."""
+    return _TARGET.format(
+        name=name, banner="\n# ".join(banner), sources=" ".join(sources), options=COMPILE_OPTIONS
+    )  # fmt: skip
+
+
 def printed(model: GeneratedModel) -> dict[str, str]:
     """CMakeLists.txt."""
     words = {"name": model.name, "upper": model.name.upper()}
     cores = ["f32", *(["q31"] if model.fixed.made is not None else [])]
-    text = _CMAKE.format(
-        options=COMPILE_OPTIONS,
-        banner="\n# ".join(banner(model.functions, model.command)),
-        sources=" ".join(f"{model.name}_{core}.c" for core in cores),
-        fixed_weak=_CMAKE_Q31.format(**words) if model.options.weak_q31_for_run is not None else "",
-        **words,
-    )
-    return {"CMakeLists.txt": text}
+    sources = [f"{model.name}_{core}.c" for core in cores]
+    fixed_weak = _CMAKE_Q31.format(**words) if model.options.weak_q31_for_run is not None else ""
+    head = target(model.name, banner(model.functions, model.command), sources)
+    return {"CMakeLists.txt": head + _CMAKE.format(fixed_weak=fixed_weak, **words)}

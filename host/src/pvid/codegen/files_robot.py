@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.c_functions import float_function
-from pvid.codegen.c_text import UNCONTRACTED, c_comment, for_cpp, guarded, number
-from pvid.codegen.cmake import COMPILE_OPTIONS
+from pvid.codegen.c_text import UNCONTRACTED, array, c_comment, for_cpp, guarded, initialised, number
+from pvid.codegen.cmake import target
 from pvid.codegen.describe import table
 from pvid.codegen.functions import identifiers
 from pvid.core.sources import PUBLIC_FOLDERS, SRC, source
@@ -26,6 +24,7 @@ from pvid.twin.printer.program import text_of
 
 MOST_P = 64  # PVID_ROBOT_P
 _LONGEST = 61  # taps of a design at most
+_WIDTH = 8  # numbers a line
 CORE = ("elementary_f32", "finite_f32", "fnv", "publication", "robot_f32")
 _VERBS = ("init", "step", "gap", "read", "covariance", "hash")
 
@@ -146,7 +145,8 @@ class RobotFiles:
     def files(self) -> dict[str, str]:
         """Name -> text of each."""
         texts = {f"{self.name}_robot.h": self._header(), f"{self.name}_robot_f32.c": self._source()}
-        texts |= {"CMakeLists.txt": self._cmake(), f"{self.name}_twin.py": self._twin(texts)}
+        cmake = target(self.name, self.banner(), [f"{self.name}_robot_f32.c"])
+        texts |= {"CMakeLists.txt": cmake, f"{self.name}_twin.py": self._twin(texts)}
         return texts if self.design is None else texts | {f"{self.name}_design_f32.h": self._design_header()}
 
     def _header(self) -> str:
@@ -189,23 +189,25 @@ class RobotFiles:
         ends = np.cumsum([len(one) for one in self.columns]).tolist()
         held = ["true" if self.compiled.signal(one).hold == "zoh" else "false" for one in self.samples[n:]]
         gains = [number(constants.get(f"kt{k}", 1.0)) for k in range(1, n + 1)]
+        fields: dict[str, object] = {
+            "joints": n,
+            "p": len(self.compiled.unknowns),
+            "forces": self.forces,
+            "entries": len(self.slots),
+        }
+        fields |= {one: one for one in ("end", "column", "slot", "gain", "held", "values")}
         parts = [
             c_comment(self.banner()),
             UNCONTRACTED,
             f'#include "{self.name}_robot.h"\n\n#include "pvid/elementary.h"',
             float_function("static void values(const float in[], float out[])", self.program),
-            _array("uint16_t", "end", ends),
-            _array("uint8_t", "column", [one for own in self.columns for one in own]),
-            _array("uint16_t", "slot", self.slots),
-            _array("float", "gain", gains),
-            _array("bool", "held", held),
-            "\n".join([
-                f"const pvid_robot_model_f32 {self.name}_robot_f32 = {{",
-                f"    .joints = {n},", f"    .p = {len(self.compiled.unknowns)},", f"    .forces = {self.forces},",
-                f"    .entries = {len(self.slots)},",
-                *(f"    .{one} = {one}," for one in ("end", "column", "slot", "gain", "held", "values")), "};",
-            ]),
-        ]  # fmt: skip
+            array("uint16_t", "end", ends, _WIDTH),
+            array("uint8_t", "column", [one for own in self.columns for one in own], _WIDTH),
+            array("uint16_t", "slot", self.slots, _WIDTH),
+            array("float", "gain", gains, _WIDTH),
+            array("bool", "held", held, _WIDTH),
+            initialised(f"const pvid_robot_model_f32 {self.name}_robot_f32", fields),
+        ]
         return "\n\n".join(parts) + "\n"
 
     def _design_header(self) -> str:
@@ -222,14 +224,17 @@ class RobotFiles:
         body = [
             f'#include "{name}_robot.h"', "",
             f"#define {upper}_MEMORY {self.memory(d.taps)}u /* floats */", "",
-            *(_floats(f"{name}_{one}", getattr(d, one)) for one in (*tables, "start", "start_sd")), "",
-            f"static const pvid_robot_design_f32 {name}_design_f32 = {{",
-            f"    .taps = {d.taps},", f"    .decimation = {d.decimation},", f"    .interval = {d.interval},",
-            *(f"    .{one} = {name}_{one}," for one in tables), f"    .white = {{{white}}},", "};", "",
-            f"static const pvid_robot_config_f32 {name}_config_f32 = {{",
-            f"    .model = &{name}_robot_f32,", f"    .design = &{name}_design_f32,",
-            f"    .start = {name}_start,", f"    .start_sd = {name}_start_sd,",
-            f"    .group = {d.group},", f"    .memory = {d.memory}u,", "};",
+            *(array("float", f"{name}_{one}", map(number, getattr(d, one)), _WIDTH)
+              for one in (*tables, "start", "start_sd")), "",
+            initialised(f"static const pvid_robot_design_f32 {name}_design_f32", {
+                "taps": d.taps, "decimation": d.decimation, "interval": d.interval,
+                **{one: f"{name}_{one}" for one in tables}, "white": f"{{{white}}}",
+            }), "",
+            initialised(f"static const pvid_robot_config_f32 {name}_config_f32", {
+                "model": f"&{name}_robot_f32", "design": f"&{name}_design_f32",
+                "start": f"{name}_start", "start_sd": f"{name}_start_sd",
+                "group": d.group, "memory": f"{d.memory}u",
+            }),
         ]  # fmt: skip
         return guarded(f"{name}_design_f32", about, body)
 
@@ -242,32 +247,3 @@ class RobotFiles:
     def roots(self) -> list[str]:
         """What the twin has: the functions of pvid/robot.h and the robot."""
         return [*(f"pvid_robot_{verb}_f32" for verb in _VERBS), f"{self.name}_robot_f32"]
-
-    def _cmake(self) -> str:
-        return _CMAKE.format(banner="\n# ".join(self.banner()), name=self.name, options=COMPILE_OPTIONS)
-
-
-_CMAKE = """\
-# {banner}
-#
-# In your own CMakeLists.txt, behind what provides pvid::pvid (add_subdirectory, FetchContent or find_package):
-#
-#     add_subdirectory({name})
-#     target_link_libraries(my_firmware PRIVATE {name})
-cmake_minimum_required(VERSION 3.20)
-add_library({name} STATIC {name}_robot_f32.c)
-target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
-target_link_libraries({name} PUBLIC pvid::pvid)
-set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
-if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
-  target_compile_options({name} PRIVATE {options})
-endif()
-"""
-
-
-def _array(kind: str, name: str, values: Sequence[object]) -> str:
-    return f"static const {kind} {name}[{len(values)}] = {{{', '.join(map(str, values))}}};"
-
-
-def _floats(name: str, values: npt.NDArray[np.float64]) -> str:
-    return _array("float", name, [number(one) for one in values])

@@ -10,7 +10,18 @@ import numpy as np
 
 from pvid.codegen import describe
 from pvid.codegen.c_functions import float_function
-from pvid.codegen.c_text import UNCONTRACTED, banner, c_comment, for_cpp, guarded, initialised, inner, number, table
+from pvid.codegen.c_text import (
+    UNCONTRACTED,
+    array,
+    banner,
+    c_comment,
+    for_cpp,
+    guarded,
+    initialised,
+    inner,
+    number,
+    table,
+)
 from pvid.codegen.files_functions import includes_of, model_struct
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.functions import Function
@@ -276,9 +287,7 @@ def shared_errors(causes: Sequence[str]) -> list[str]:
 
 
 def floats(name: str, values: Float32, comment: str) -> str:
-    rows = [values[k : k + _WIDTH] for k in range(0, len(values), _WIDTH)]
-    lines = ["    " + ", ".join(float_literal(x) for x in row) + "," for row in rows]
-    return "\n".join([f"/* {comment} */", f"static const float {name}[{values.size}] = {{", *lines, "};"])
+    return f"/* {comment} */\n{array('float', name, map(float_literal, values), _WIDTH)}"
 
 
 def _design_tables(design: WeakDesign32) -> list[str]:

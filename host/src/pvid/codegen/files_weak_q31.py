@@ -7,7 +7,7 @@ from dataclasses import fields
 
 from pvid.codegen import describe
 from pvid.codegen.c_functions import fixed_function, scaled_function
-from pvid.codegen.c_text import banner, c_comment, for_cpp, guarded
+from pvid.codegen.c_text import array, banner, c_comment, for_cpp, guarded
 from pvid.codegen.files_weak import shared_errors, size_check
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.codegen.generated import GeneratedModel
@@ -173,9 +173,7 @@ def structs(kind: str, name: str, entries: Iterable[Sequence[object]]) -> str:
 
 def numbers(kind: str, name: str, values: Iterable[int]) -> str:
     """A constant array of integers; "" of none."""
-    given = [str(int(one)) for one in values]
-    rows = [f"    {', '.join(given[k : k + _WIDTH])}," for k in range(0, len(given), _WIDTH)]
-    return "\n".join([f"static const {kind} {name}[{len(given)}] = {{", *rows, "};"]) if given else ""
+    return array(kind, name, map(int, values), _WIDTH)
 
 
 def _model(made: FixedWeak, prefix: str) -> list[str]:

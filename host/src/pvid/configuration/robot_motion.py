@@ -197,6 +197,10 @@ class Task:
             out.append(self.series.basis(t, np.full(t.shape, k != 1)))
         return out
 
+    def values(self, q: Float, v: Float, a: Float) -> list[npt.NDArray[np.complex128]]:
+        """The program's results; their imaginary parts over _TINY are their derivatives by time."""
+        return evaluated(self.program, [*(q + 1j * _TINY * v), *(v + 1j * _TINY * a)])
+
     def rows(self, q: Float, v: Float, found: list[npt.NDArray[np.complex128]]) -> Float:
         """Y [n, p, times] from the program's results."""
         out = np.zeros((self.n, len(self.columns), q.shape[1]))
@@ -215,7 +219,7 @@ class Task:
         p = self.p if p is None else p
         for first in range(0, q.shape[1], _TICKS):
             own = slice(first, first + _TICKS)
-            found = evaluated(self.program, [*(q + 1j * _TINY * v)[:, own], *(v + 1j * _TINY * a)[:, own]])
+            found = self.values(q[:, own], v[:, own], a[:, own])
             out = np.zeros(q[:, own].shape)
             for (order, joint, place), one in zip(self.entries, found, strict=True):
                 out[joint] += p[place] * (np.imag(one) / _TINY if order else np.real(one))

@@ -122,9 +122,11 @@ def strong_design(
     return _designed(strong, oracle, recording, best, law)
 
 
-def reference_of(found: Identified) -> Float:
+def reference_of(found: Identified | None) -> Float | None:
     """What the errors of the strong form are measured by: p of the weak form, NaN where it determines none [n_p]."""
-    return np.where([one.status == "not_identified" for one in found.judged], np.nan, found.p)
+    return (
+        None if found is None else np.where([one.status == "not_identified" for one in found.judged], np.nan, found.p)
+    )
 
 
 def five_point_design(model: CompiledModel, recording: Recording) -> StrongDesign:

@@ -59,9 +59,7 @@ def boards_of(paths: Iterable[Path]) -> dict[Path, str]:
         return {path: str(folder) for path, folder in folders.items()}
     often = Counter(name for name, _ in names.values() if name)
     stems = {name: one[1] for name in often if (one := _NUMBERED.fullmatch(name))}
-    boards = {
-        stems.get(name) for name, count in often.items() if count > 1
-    }  # motor of motor_1: its number is a board's
+    boards = {stems.get(name) for name, count in often.items() if count > 1}  # whose number is no recording's: motor_1
     own = {}
     for path, (name, dated) in names.items():
         numbered = _NUMBERED.fullmatch(name)

@@ -92,7 +92,7 @@ def bodies_of(chain: Chain, p: Float, covariance: Float, lost: npt.NDArray[np.bo
     try:
         root = np.linalg.inv(np.linalg.cholesky(related)) / sd
         a, y = root @ shares @ scaled, root @ wanted
-        found = np.tile(_inertial(np.eye(4)), len(file))
+        found = np.tile(inertial_of(np.eye(4)), len(file))
         g = 1 + float(np.sum((a @ found - y) ** 2)) / len(own)
         while True:
             found, gain = _nearest(a, y, g, found)
@@ -114,14 +114,21 @@ def _coordinates(inertial: Float) -> Float:
     out = np.zeros((inertial.size, inertial.size))
     for k, one in enumerate(np.linalg.cholesky(pseudo_inertias(inertial))):
         place = slice(len(INERTIAL) * k, len(INERTIAL) * (k + 1))
-        out[place, place] = np.array([_inertial(one @ part @ one.T) for part in BASIS]).T
+        out[place, place] = np.array([inertial_of(one @ part @ one.T) for part in BASIS]).T
     return out
 
 
-def _inertial(j: Float) -> Float:
+def inertial_of(j: Float) -> Float:
     """Of a pseudo-inertia [10]."""
     about = np.trace(j[:3, :3]) * np.eye(3) - j[:3, :3]
     return np.array([j[3, 3], *j[:3, 3], *about[np.triu_indices(3)]])
+
+
+def about_centre(j: Float) -> tuple[float, Float, Float]:
+    """Mass, centre [3] and inertia about the centre [3, 3] of a pseudo-inertia."""
+    mass, centre = float(j[3, 3]), j[:3, 3] / j[3, 3]
+    second = j[:3, :3] - mass * np.outer(centre, centre)
+    return mass, centre, np.trace(second) * np.eye(3) - second
 
 
 def _nearest(a: Float, y: Float, g: float, s: Float) -> tuple[Float, float]:

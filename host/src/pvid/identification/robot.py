@@ -100,9 +100,9 @@ class RobotAnswer(Answer):
                 "record with more bits"
             )
             reasons.append(Reason("sensor", text))
+        values = [self.values[name] for name in names]
+        sd = np.array([math.hypot(it.se_noise or math.inf, it.se_scale or 0.0) for it in values])
         for one in sure(fit):
-            values = [self.values[name] for name in names]
-            sd = np.array([math.hypot(it.se_noise or math.inf, it.se_scale or 0.0) for it in values])
             moved = [k for k in np.argsort(-np.abs(one.shift) / sd) if abs(one.shift[k]) > sd[k]]
             slides = self.model.chain is not None and self.model.chain.joints[one.joint].prismatic
             unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")

@@ -20,7 +20,7 @@ from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
 from pvid.base.wording import printable, with_unit
 from pvid.identification.answer import Float
-from pvid.identification.bodies import pseudo_inertias
+from pvid.identification.bodies import about_centre, pseudo_inertias
 from pvid.identification.robot import RobotAnswer
 from pvid.model.chain import INERTIAL
 from pvid.model.robot import Robot
@@ -123,7 +123,7 @@ def write_robot(answer: RobotAnswer, source: Source, out: Path, made: str) -> li
             "motion determines none"
         )
     for k, after in enumerate(pseudo_inertias(bodies.inertial)):
-        own = [one for one, carrier in enumerate(robot.carrier) if carrier == k and robot.model.body_mass[one] > 0]
+        own = [one for one in robot.bodies(k) if robot.model.body_mass[one] > 0]
         if not own:
             continue
         before = pseudo_inertias(np.array([robot.inertial(k, [one]) for one in own]))
@@ -197,9 +197,7 @@ def _child(parent: ElementTree.Element, tag: str) -> ElementTree.Element:
 def _put(body: ElementTree.Element | None, j: Float) -> None:
     """Gives a link of URDF or a body of MJCF a pseudo-inertia."""
     assert body is not None
-    mass, centre = float(j[3, 3]), j[:3, 3] / j[3, 3]
-    second = j[:3, :3] - mass * np.outer(centre, centre)
-    about = np.trace(second) * np.eye(3) - second
+    mass, centre, about = about_centre(j)
     at, moments = " ".join(repr(float(one)) for one in centre), [repr(float(about[one])) for one in _PRODUCTS]
     inertial = _child(body, "inertial")
     if body.tag == "body":

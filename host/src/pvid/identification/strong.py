@@ -114,8 +114,7 @@ def identify_strong_mechanism(
     core : f32, q31; f64: the analysis
     """
     refuse_constant(recording, model)
-    found = attempted(lambda: analysed(recording, model).found)
-    reference = None if found is None else reference_of(found)
+    reference = reference_of(attempted(lambda: analysed(recording, model).found))
     fixed = strong_design_to_identify(model, recording, law, reference) if core == STRONG_FIXED.name else None
     design = strong_design(model, recording, law, reference) if fixed is None else fixed.base
     fitted = design.fitted

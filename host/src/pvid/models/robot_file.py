@@ -72,8 +72,12 @@ class Placed:
 
     def inertial(self, place: int, bodies: Sequence[int] | None = None) -> Float:
         """Mass, first moments and inertia of all that a joint moves, or of some bodies, in the joint's frame [10]."""
-        own = [k for k, one in enumerate(self.carrier) if one == place] if bodies is None else bodies
+        own = self.bodies(place) if bodies is None else bodies
         return _inertial(self.model, self.data, own, *self.frames[place])
+
+    def bodies(self, place: int) -> list[int]:
+        """MuJoCo's numbers of all that a joint moves, up to the next joint that does."""
+        return [k for k, one in enumerate(self.carrier) if one == place]
 
 
 def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Placed:
@@ -107,11 +111,12 @@ def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Pla
 
 
 def model_text(path: Path, chosen: Sequence[str] = (), folder: Path | None = None) -> str:
-    """The text of a model file, which lies in a folder, that of the robot's file by default.
+    """The text of a model file, as `text_of`. Raises PvidError, and has the parameters, as `placed`."""
+    return text_of(placed(path, chosen), path, folder)
 
-    Raises PvidError, and has the parameters, as `placed`.
-    """
-    robot = placed(path, chosen)
+
+def text_of(robot: Placed, path: Path, folder: Path | None = None) -> str:
+    """The text of a model file of a robot's file, which lies in a folder, that of the robot's file by default."""
     model, names = robot.model, robot.names
     source = os.path.relpath(path, folder or path.parent).replace(os.sep, "/")
     lines = [
@@ -144,8 +149,7 @@ def model_text(path: Path, chosen: Sequence[str] = (), folder: Path | None = Non
         if model.jnt_actfrclimited[joint] and (most := min(abs(model.jnt_actfrcrange[joint]))) > 0:
             given["torque"] = _number(most)
         first = ", ".join([json.dumps(name), *(f"{key}={value}" for key, value in given.items())])
-        own = [model.body(k).name for k in range(model.nbody) if robot.carrier[k] == place]
-        known = not set(own) & set(robot.bare)
+        known = not any(model.body(k).name in robot.bare for k in robot.bodies(place))
         lines += [f"model.joint({first}{',' if known else ')'}"]
         lines += [f"            inertial={_numbers(robot.inertial(place))})"] * known
     return "\n".join([*lines, ""])
@@ -274,7 +278,7 @@ def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[
     if len(joints) > MOST_JOINTS:
         raise PvidError(
             f"{path}: {len(joints)} joints are more than {MOST_JOINTS}: choose some of them with --joints: "
-            f"{','.join(map(printable, names))}"
+            f"{','.join(names)}"
         )
     for one in joints:
         if model.jnt_stiffness[one] > 0:
@@ -311,10 +315,10 @@ def _refuse_loops(mujoco: Any, model: Any, carrier: Sequence[int], path: Path) -
         kind, one, other = model.eq_type[k], int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         bodies, tied = [one, other], ""
         if kind == kinds.mjEQ_JOINT:
-            both = [model.joint(at).name for at in bodies if at >= 0]
-            free = [name for name in map(lambda at: model.joint(at).name, range(model.njnt)) if name not in both]
-            tied = f"; hold {listed(map(printable, both))}"
-            tied += f": --joints {','.join(map(printable, free))}" if free else ""
+            names = _names(model)
+            both = [names[at] for at in bodies if at >= 0]
+            free = [name for name in names if name not in both]
+            tied = f"; hold {listed(both)}" + (f": --joints {','.join(free)}" if free else "")
             bodies = [int(model.jnt_bodyid[at]) for at in bodies if at >= 0]
         elif kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or model.eq_objtype[k] != mujoco.mjtObj.mjOBJ_BODY:
             bodies = [0, model.nbody - 1]

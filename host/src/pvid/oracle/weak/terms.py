@@ -451,7 +451,7 @@ class Candidate:
     top : of an act, largest magnitude of the signal as recorded; of a course, the change for size 1
     most : largest believable size
     weights : of a course, how far it is there in each window [windows]; None: all the time
-    rows : of a law, names of the rows that it stands in, and its sign there
+    rows : of a law, names of the rows that contain it, and its sign in each
     size : estimate
     certainty : |size| over its standard error
     own : part of the column's square that no change of p explains
