@@ -18,7 +18,6 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.refine import RefineConfig
 
 BOARD = "mps2-an386"
-TIMEOUT_S = 60.0
 
 
 @pytest.fixture(scope="module")

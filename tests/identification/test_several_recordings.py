@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete, dlsim
@@ -33,8 +32,6 @@ from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Recording
 from pvid.rig.together import joined
 from pvid.sim.simulated_run import RigSimulation
-
-Float = npt.NDArray[np.float64]
 
 RATE = 250.0
 NOISE = 4e-4

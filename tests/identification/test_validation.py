@@ -5,7 +5,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from program import pvid
 
@@ -18,8 +17,6 @@ from pvid.identification.answer import Analysis
 from pvid.identification.road import identified
 from pvid.identification.validation import Validation, validated
 from pvid.rig.run import Recording
-
-Float = npt.NDArray[np.float64]
 
 CART = PLANTS["cart"]
 DRAG = next(one for one in EFFECTS if (one.plant, one.name) == ("cart", "drag"))

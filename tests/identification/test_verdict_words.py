@@ -26,7 +26,7 @@ from pvid.model import Model
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Reason, Verdict, of_width
-from pvid.oracle.weak.words import WIDE, Word, of_warning
+from pvid.oracle.weak.words import WIDE, Word
 from pvid.rig.run import Recording
 
 
@@ -112,14 +112,6 @@ def test_what_no_term_explains_is_usable_only_where_the_run_is_predicted() -> No
     for name, truth in (("T", T), ("K", K)):
         one = judged.values[name]
         assert one.value and one.se and abs(one.value - truth) < 4 * one.se
-
-
-def test_identifier_that_judges_as_a_whole_has_the_same_words() -> None:
-    assert [of_warning(*one) for one in ((True, None), (True, "w"), (False, "w"))] == [
-        "good",
-        "usable",
-        "not_identified",
-    ]
 
 
 @pytest.mark.parametrize(("share", "se", "known"), [(0.0, 0.08, False), (0.0, 0.002, True), (-1.0, 0.08, True)])

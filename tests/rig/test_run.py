@@ -16,8 +16,6 @@ from pendulum_run import Run, read_run, write_run
 from pvid.base.errors import PvidError
 from pvid.rig.run import MIN_ROWS
 
-Float = npt.NDArray[np.float64]
-
 SUFFIXES = (".csv", ".csv.gz", ".npz", ".parquet")
 
 # Reading hostile files takes as long as the disk does.

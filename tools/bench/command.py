@@ -26,7 +26,6 @@ def _number(name: str, default: int, about: str = "Runs of each case.") -> tuple
 
 
 _SEEDS, _ONCE = _number("--seeds", 20), _number("--runs", 1, "Of each image.")
-_FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
 _ACCURACY = ("mechanisms", "mechanisms-chosen", "mechanisms-summary", "mechanisms-two-windows", "imperfections")
 
 CASES = (

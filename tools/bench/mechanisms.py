@@ -24,7 +24,6 @@ from pvid.sim.simulated_run import PERFECT, SOFT, RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
 
-SEEDS = 20
 OFF = 0.5  # of a start: within +-50 % of the truth
 CLOSE = 0.05  # "within 5 %"
 WRONG = 4.0  # standard errors: an error above is not covered

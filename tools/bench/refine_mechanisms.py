@@ -27,7 +27,6 @@ from pvid.sim.simulated_run import RigSimulation
 
 Float = npt.NDArray[np.float64]
 
-SEEDS = 20
 NAMES = tuple(mechanisms.names())
 RATES = {"furuta": (1000.0, 1250.0, 2000.0)}  # beside the rig's own [Hz]
 HEADER = (

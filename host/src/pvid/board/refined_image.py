@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
@@ -64,7 +63,6 @@ def published_run(
     ticks: int,
     board: Board,
     options: Collection[str] = (),
-    motion: Mapping[str, npt.ArrayLike] | None = None,
 ) -> RefinedRun:
     """The shipped rig of a mechanism with the equations of its refinement; the ticks of the steady state count in the
     mean, as in mechanism_run, behind the first window in which a refined estimate is published.
@@ -74,12 +72,11 @@ def published_run(
     Parameters
     ----------
     options : of the refinement; Runge-Kutta's steps have their usual jobs, with fewer they are too late
-    motion : another one of the rig: name of each signal -> samples
     """
     run = refined_run(name, ticks, options)
     if not run.made.runge_kutta:
         run = replace(run, settings=replace(run.settings, **light_work(board)))  # type: ignore[arg-type]
-    measured = motion or full_motion_of(run.weak.compiled, ticks / run.weak.config.sample_rate)
+    measured = full_motion_of(run.weak.compiled, ticks / run.weak.config.sample_rate)
     samples = np.stack([np.asarray(measured[one]) for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
     run = replace(run, weak=replace(run.weak, counts=np.rint(samples / run.weak.lsb).astype(np.int32)))
     published = np.flatnonzero(run.native().run_both(run.weak.samples).told == Reason.UPDATED)

@@ -129,12 +129,12 @@ def _start_emulator(board: Board, image: str, wrap: Callable[[Port], Port]) -> T
         return Target(board.name, board.core, wrap(_open_or_kill(place, process)), process, _COMING_UP_S)
 
 
-def _start_host(image: str, wrap: Callable[[Port], Port], patience_s: float = 60.0) -> Target:
+def _start_host(image: str, wrap: Callable[[Port], Port]) -> Target:
     """The host's build, which prints the name of its pseudo-terminal."""
     process = child.start([image], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0)
     assert process.stdout is not None
     output = b""
-    if select.select([process.stdout], [], [], patience_s)[0]:
+    if select.select([process.stdout], [], [], 60.0)[0]:
         output = process.stdout.read(4096)
     process.stdout.close()
     found = re.search(rb"/dev/\S+", output)

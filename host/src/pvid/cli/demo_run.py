@@ -38,7 +38,6 @@ from pvid.sim.simulated_run import RigSimulation
 
 _THE_SAME = 1e-3  # relative, of a guess and the truth
 _COVERED = 3.0  # standard errors within which an estimate is marked as right
-_BITS = 14  # of the standard rig's encoder
 _FINER = 64  # times, for the strong form: 20 bits in place of 14
 _LONG_S = 1000.0  # without decimals from here on
 _IN_TWO_COLUMNS = 5  # parameters from which on two stand in a line

@@ -163,7 +163,7 @@ def predict(
         listing = {
             one.drive: one.failure or dict(zip(compiled.p_names, one.relative.tolist(), strict=True)) for one in found
         }
-        click.echo(json.dumps({"relative_se": listing, "advice": advice(compiled, found)}))
+        click.echo(json.dumps({"relative_se": listing, "advice": advice(found)}))
         return DONE
     table = Table("", *(one.drive for one in found), title=f"{compiled.title}: standard errors [%]")
     for k, name in enumerate(compiled.p_names):
@@ -174,7 +174,7 @@ def predict(
     for one in found:
         if one.failure:
             write_stderr(f"pvid: {one.drive}: {one.failure}")
-    click.echo(advice(compiled, found))
+    click.echo(advice(found))
     return DONE if not all(one.failure for one in found) else NOTHING_IDENTIFIED
 
 

@@ -35,8 +35,6 @@ from pvid.settings.enums import Law
 from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import NONE, Float32, Source, WeakConfig, WeakDesign32, WeakModel
 
-_SOURCES = {Source.SAMPLED: "", Source.HELD: "held until the next", Source.JUMP: "", Source.LAST: ""}
-
 
 def printed(model: GeneratedModel) -> dict[str, str]:
     """NAME_weak.h and NAME_weak_f32.c, where there is a weak form."""

@@ -115,19 +115,6 @@ def source(made: FixedWeak, parameters: ParametersQ31, command: str) -> str:
     )
 
 
-def together(made: FixedWeak, parameters: ParametersQ31, design: WeakDesignQ31, prefix: str) -> str:
-    """Functions, PREFIX_weak_q31 and PREFIX_design_q31 in one text, for proofs."""
-    return "\n\n".join(
-        [
-            '#include "pvid/weak_q31.h"\n#include "pvid/elementary_q31.h"\n\n#include <stddef.h>',
-            _functions(made, prefix).rstrip(),
-            parameters_in_c(parameters, prefix).rstrip(),
-            *_model(made, prefix),
-            *_design(design, prefix),
-        ]
-    )
-
-
 def design_header(
     config: WeakConfigQ31, name: str, needed: Mapping[str, int], command: str, about: Sequence[str]
 ) -> str:

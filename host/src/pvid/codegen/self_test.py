@@ -91,9 +91,9 @@ def inputs_of(functions: ModelFunctions, function: Function, count: int = VECTOR
     return spread([-one for one in reach], reach, count).astype(np.float32)
 
 
-def fixed_inputs_of(fixed: FixedModel, count: int = VECTORS) -> Int:
-    """Inputs within their limits [inputs, count]."""
-    return np.rint(spread([-one for one in fixed.limits], fixed.limits, count)).astype(np.int64)
+def fixed_inputs_of(fixed: FixedModel) -> Int:
+    """Inputs within their limits [inputs, VECTORS]."""
+    return np.rint(spread([-one for one in fixed.limits], fixed.limits, VECTORS)).astype(np.int64)
 
 
 def scaled_of(values: Float) -> Int:

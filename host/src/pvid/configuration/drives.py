@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import ranked
 from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.verdict import partner_of
@@ -76,7 +75,7 @@ def _sizes(simulation: RigSimulation) -> Float:
     return np.array([abs(p) if one.positive else one.sd for one, p in unknowns])
 
 
-def advice(model: CompiledModel, found: list[Prediction]) -> str:
+def advice(found: list[Prediction]) -> str:
     """One sentence: the best drive, the parameter that it determines worst, and what imitates it."""
     able = [one for one in found if not one.failure]
     if not able:

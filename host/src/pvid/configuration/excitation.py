@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
@@ -21,7 +20,6 @@ from pvid.models.simulated_rig import SimulatedRig
 from pvid.rig.run import Recording
 from pvid.sim.simulated_run import RigSimulation
 
-Float = npt.NDArray[np.float64]
 Progress = Callable[[int], None]
 
 TONES = 8

@@ -224,10 +224,10 @@ def _at_rest(made: RefineFunctions) -> State:
     return np.zeros(n, np.float32), np.zeros(n if made.order == 2 else 0, np.float32)
 
 
-def r_of(made: RefineFunctions, p: npt.ArrayLike, width: float = _SHARP) -> Float:
+def r_of(made: RefineFunctions, p: npt.ArrayLike) -> Float:
     """r of parameters of the weak form."""
     given = np.asarray(p, float)
-    return np.array([given[x.place] if x.place >= 0 else width if x.sign else 0.0 for x in made.parameters])
+    return np.array([given[x.place] if x.place >= 0 else _SHARP if x.sign else 0.0 for x in made.parameters])
 
 
 def _slopes(made: RefineFunctions, r: Float, q: Float32, v: Float32) -> Float:

@@ -210,13 +210,13 @@ def _with_fewer_functions(design: WeakDesign) -> Iterator[WeakDesign]:
             yield replace(design, functions=count)
 
 
-def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = None) -> WeakConfig:
+def config_for_simulated_rig(compiled: CompiledModel) -> WeakConfig:
     """Settings for the shipped rig of a mechanism, with its own design, and for its simulation, which is exact: there
     are no shared errors.
 
     Raises PvidError where the mechanism has no shipped rig.
     """
-    run, design, p = simulated_run_of(compiled, functions)
+    run, design, p = simulated_run_of(compiled)
     return weak_config(compiled, run, design, p)
 
 

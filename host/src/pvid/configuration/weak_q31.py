@@ -174,12 +174,9 @@ def weak_q31_to_identify(compiled: CompiledModel, recording: Recording, ranking:
     return replace(weak, config=replace(weak.config, trust=trust))
 
 
-def weak_q31_for_simulated_rig(
-    compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
-) -> WeakQ31:
+def weak_q31_for_simulated_rig(compiled: CompiledModel) -> WeakQ31:
     """For the shipped rig of a mechanism, with its own design."""
-    run, design, p = simulated_run_of(compiled, functions)
-    return weak_q31_for_run(compiled, run, design, p, soft_signs=soft_signs)
+    return weak_q31_for_run(compiled, *simulated_run_of(compiled))
 
 
 def weak_q31_for_rig_like_the_shipped(

@@ -16,8 +16,6 @@ from pvid.core.refusals import refused
 from pvid.settings.enums import Core, Status
 from pvid.settings.record import Record
 
-Float32 = npt.NDArray[np.float32]
-
 
 class OfEstimator(NamedTuple):
     """An estimator of the core. sizes: its numbers of parameters and of sums; assess: the function in C, of the

@@ -11,9 +11,9 @@ from pvid.deploy.deployment import Deployment, Files
 from pvid.deploy.identifier import identifier_files
 
 
-def library_files(deployment: Deployment, folder: str = "src") -> Files:
-    """Everything that is compiled, in one folder that is the only include path."""
-    return under(folder, all_files(deployment))
+def library_files(deployment: Deployment) -> Files:
+    """Everything that is compiled, in `src`, which is the only include path."""
+    return under("src", all_files(deployment))
 
 
 def all_files(deployment: Deployment) -> Files:

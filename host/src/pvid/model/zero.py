@@ -142,11 +142,11 @@ def _fraction(source: random.Random) -> Fraction:
     return Fraction(source.randint(2, 97), source.randint(2, 97))
 
 
-def dependent(functions: Sequence[sp.Expr], seed: int = 1) -> dict[int, Mapping[int, sp.Rational]]:
+def dependent(functions: Sequence[sp.Expr]) -> dict[int, Mapping[int, sp.Rational]]:
     """Functions that are linear combinations of earlier ones, with the coefficients of those, over the rationals."""
     if len(functions) == 0:
         return {}
-    sampler, source = Sampler(functions), random.Random(seed)
+    sampler, source = Sampler(functions), random.Random(1)
     rows = [sampler.at_random(source) for _ in range(len(functions) + 2)]
     found, pivots = echelon([list(map(residue, row)) for row in rows])
     out: dict[int, Mapping[int, sp.Rational]] = {}

@@ -10,7 +10,6 @@ import numpy.typing as npt
 from pvid.rig.gaps import longest_bridged
 from pvid.rig.table import Table
 
-FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 # Periods of the counters that time stamps come from [s], and in the column's own unit.

@@ -27,7 +27,6 @@ from pvid.twin.printer.values import filled, numbers
 from pvid.twin.state import take_over
 
 Progress = Callable[[int], None]
-Words = npt.NDArray[np.uint32]
 
 _PROGRESS_TICKS = 512
 _HASHING = Lock()  # a printed module is shared by all threads

@@ -485,11 +485,11 @@ class Problem:
             falls.append(relative**2)
         return falls[1] - falls[0], errors[1] / np.maximum(errors[0], 1e-300)
 
-    def first_starts(self, cut: Cut, r: Float, guess: Float | None = None) -> Float:
-        """Starts: measured coordinates and their rates from the samples about each block's first; the rest from
-        `guess` or 0."""
+    def first_starts(self, cut: Cut, r: Float) -> Float:
+        """Starts: measured coordinates and their rates from the samples about each block's first; the rest are
+        0."""
         made, m = self.kernel.made, self.measured
-        starts = np.zeros((len(cut.first), self.kernel.states)) if guess is None else guess.copy()
+        starts = np.zeros((len(cut.first), self.kernel.states))
         names = list(made.coordinates)
         for column, output in enumerate(made.outputs):
             if output in names:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -95,16 +95,10 @@ class RefinedKernel:
         out[self.widths] = _WIDEST
         return out
 
-    def steps(
-        self, samples: int, rate: float, r: Float, widths: Mapping[str, float] | None = None, coarse: int | None = None
-    ) -> tuple[int, int, Float]:
-        """Steps a sample, those of them that are one where no friction reverses, and r with widths of the signs.
-
-        Parameters
-        ----------
-        widths : by argument; by default the jump of the rate within a step that a friction's reversal makes: RK4 stays
-            stable and smooth
-        coarse : where there are signs; from the number of samples by default
+    def steps(self, samples: int, rate: float, r: Float, coarse: int | None = None) -> tuple[int, int, Float]:
+        """Steps a sample, those of them that are one where no friction reverses (`coarse`; from the number of samples
+        by default), and r with widths of the signs: the jump of the rate within a step that a friction's reversal
+        makes, with which RK4 stays stable and smooth.
         """
         if samples < 1:
             raise PvidError("the recording is too short for the refinement")
@@ -116,8 +110,7 @@ class RefinedKernel:
         for place in self.widths:
             sharp = r.copy()
             sharp[place] = _SHARPEST
-            own = max(self._fastest(sharp) * _SHARPEST / rate / sub, _SHARPEST)
-            r[place] = (widths or {}).get(self.made.parameters[place].sign) or own
+            r[place] = max(self._fastest(sharp) * _SHARPEST / rate / sub, _SHARPEST)
         return sub, coarse, r
 
     def _fastest(self, r: Float) -> float:

@@ -120,13 +120,11 @@ def begins_of(signals: Mapping[str, Float], mean: int = 1) -> list[int]:
     return [-(-int(first) // mean) for first in np.flatnonzero(np.diff(number, prepend=-1.0))]
 
 
-def problem_of(
-    model: CompiledModel, signals: Mapping[str, Float], rate: float, p: Float, widths: Mapping[str, float] | None = None
-) -> tuple[Problem, Float]:
+def problem_of(model: CompiledModel, signals: Mapping[str, Float], rate: float, p: Float) -> tuple[Problem, Float]:
     """The problem, and r at p of the weak form, with widths of the signs."""
     kernel = kernel_of(model, begins=begins_of(signals))
     made = kernel.made
-    sub, coarse, r = kernel.steps(len(signals[made.outputs[0]]), rate, kernel.start(p), widths)
+    sub, coarse, r = kernel.steps(len(signals[made.outputs[0]]), rate, kernel.start(p))
     inputs = inputs_of(model, made, signals, rate, sub)
     measured = Measured(
         np.stack([signals[name] for name in made.outputs], -1),
@@ -159,16 +157,14 @@ def refine_mechanism(
     rate: float,
     p: Float,
     block_s: float,
-    widths: Mapping[str, float] | None = None,
 ) -> RefinedMechanism:
     """Refines an estimate p of the weak form.
 
     Parameters
     ----------
     block_s : length of a block [s]
-    widths : of signs, by argument; from the sampling by default
     """
-    problem, r = problem_of(model, signals, rate, p, widths)
+    problem, r = problem_of(model, signals, rate, p)
     prior = prior_about(problem, r)
     samples = max(8, round(block_s * rate))
     shorter = refined(problem, prior, (max(8, samples // 3),))

@@ -129,7 +129,7 @@ class Problems:
         made, rate = kernel.made, self._rate / mean
         samples = len(self._signals[made.outputs[0]]) // mean
         coarse = _SIGN_COARSE if optional and not self._base.widths else None
-        sub, coarse, _ = kernel.steps(samples, rate, kernel.start(self._p), None, coarse)
+        sub, coarse, _ = kernel.steps(samples, rate, kernel.start(self._p), coarse)
         z, grown = averages(np.stack([self._signals[name] for name in made.outputs], -1)[: samples * mean], mean)
         inputs: Inputs
         if is_driven_by_derivatives(model):
@@ -160,7 +160,7 @@ class Problems:
         names = [one.name for one in kernel.made.parameters]
         p = np.array([values[name] for name in self._model.p_names])
         r, measured = kernel.start(p), problem.measured
-        _, _, sharp = kernel.steps(len(measured.z), measured.rate, r, None, measured.coarse)
+        _, _, sharp = kernel.steps(len(measured.z), measured.rate, r, measured.coarse)
         r[kernel.widths] = sharp[kernel.widths]
         for k, name in enumerate(names):
             r[k] = values.get(name, r[k])

@@ -13,11 +13,6 @@ _ORDER: tuple[Word, ...] = get_args(Word)
 WIDE = 0.1
 
 
-def of_warning(identified: bool, warning: str | None) -> Word:
-    """Of an identifier that judges its answer as a whole."""
-    return "not_identified" if not identified else "good" if warning is None else "usable"
-
-
 def worst(words: Iterable[Word]) -> Word:
     """Of several; good where there are none."""
     return max(words, key=_ORDER.index, default="good")
