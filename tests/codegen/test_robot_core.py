@@ -15,7 +15,7 @@ from robot_models import ARMS, made, model_of, truth_of
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.codegen.files_robot import RobotFiles, board_report, refuse_large
+from pvid.codegen.files_robot import RobotFiles, board_report, refuse_in_c
 from pvid.codegen.robot_library import RobotNative, RobotTwin
 from pvid.configuration.robot_core import robot_core_design
 from pvid.model import Robot
@@ -162,5 +162,5 @@ def test_what_the_core_does_not_take_is_refused_in_a_sentence() -> None:
     large = model_of(robot_arms.tree(1, 9))
     assert len(large.unknowns) > 64
     with pytest.raises(PvidError, match="base parameters and the C core takes at most 64: hold joints by"):
-        refuse_large(large)
+        refuse_in_c(large)
     assert "not in C, which takes at most 64" in board_report(large)

@@ -127,7 +127,12 @@ REFUSED = {
     "no file": (None, (), "cannot be read"),
     "no XML": ("t,q1\n0,1\n", (), "is no URDF or MJCF file"),
     "unknown": ("<mujoco><worldbody><thing/></worldbody></mujoco>", (), "MuJoCo does not read it"),
-    "floating": (FREE, (), "its base floats (a free joint)"),
+    "two free": (FREE.replace("</worldbody>", "<body><freejoint/><geom size='1'/></body></worldbody>"), (), "are free"),
+    "one held, one free": (
+        FREE.replace("</body></worldbody>", "<body><joint name='k'/><geom size='1'/></body></body>"
+                     "<body><joint name='j'/><geom size='1'/></body></worldbody>"), (),
+        "j move on a fixed base, and another base is free: one robot at a time",
+    ),
     "ball": (BALL, (), "b is a ball joint"),
     "no joint": (STILL, (), "no joint moves"),
     "spring": (SPRING, (), "s has a spring (stiffness)"),

@@ -95,7 +95,7 @@ REFUSED: dict[str, tuple[Callable[[Robot], Any], str]] = {
     "axis": (lambda r: r.joint("a", (0, 0, 2)), "a: the axis (0, 0, 2) must have the length 1, not 2"),
     "numbers": (lambda r: r.joint("a", (0, 1)), "a: axis has three numbers, not (0, 1)"),
     "twice": (lambda r: _joints(r, "a", "a"), "the joint a is there twice"),
-    "parent": (lambda r: r.joint("a", (0, 0, 1), parent="b"), "a: its parent b is no joint before it"),
+    "parent": (lambda r: r.joint("a", (0, 0, 1), parent="b"), "a: its parent b is none of base"),
     "inertial": (lambda r: r.joint("a", (0, 0, 1), inertial=(1, 2)), "a: inertial has 10 numbers: m, hx"),
     "many": (lambda r: _joints(r, *map(str, range(13))), "a robot has at most 12 joints"),
     "none": (lambda r: r.compiled(), "arm: the robot has no joint"),

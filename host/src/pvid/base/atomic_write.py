@@ -42,7 +42,7 @@ def appearing(path: Path, *, freely: bool = False) -> Iterator[Path]:
         refuse_foreign(path)
     place = Path(os.path.realpath(path))
     # Of a length of its own: a name that is as long as names may be has no room for more.
-    temporary = place.with_name(f".{os.getpid()}-{next(_NUMBERS)}.tmp")
+    temporary = place.with_name(f".{os.getpid()}-{next(_NUMBERS)}.tmp{place.suffix}")
     try:
         yield temporary
         if not freely:

@@ -54,9 +54,10 @@ command.add_command(of_model)
     multiple=True,
     help="Joints that move and are recorded, from the base outwards; others are held at their zero.  [default: all]",
 )
+@click.option("--free-base", is_flag=True, help="The first link of URDF is fixed to nothing: a drone, a satellite.")
 @force_option
-def from_file(path: Path, out: Path, joints: tuple[str, ...]) -> int:
-    """Writes a model file of the robot in FILE, a URDF or MJCF file on a fixed base.
+def from_file(path: Path, out: Path, joints: tuple[str, ...], free_base: bool) -> int:
+    """Writes a model file of the robot in FILE, a URDF or MJCF file.
 
     `pvid identify LOG --model` then gives its base parameters from a log with the columns q1, tau1, q2, tau2, .. in
     the order of the joints (host/docs/robots.md).
@@ -67,12 +68,13 @@ def from_file(path: Path, out: Path, joints: tuple[str, ...]) -> int:
 
     if out.suffix != ".py":
         raise PvidError(f"{out}: the name of a model file ends with .py")
-    robot = placed(path, listed_names(joints))
+    robot = placed(path, listed_names(joints), free_base=free_base)
     for note in robot.notes:
         write_stderr(f"pvid: note: {note}")
     write_whole(out, text_of(robot, path, out.parent))
     compiled = compiled_of(out)
-    click.echo(f"{out}: {len(compiled.signals) // 2} joints, {len(compiled.unknowns)} base parameters")
+    base = " on a free base" if robot.free else ""
+    click.echo(f"{out}: {len(robot.joints) - robot.free} joints{base}, {len(compiled.unknowns)} base parameters")
     return DONE
 
 
@@ -291,10 +293,10 @@ def _build_robot(
     compiled: CompiledModel, recording: Recording | None, out: Path, only_check: bool, given: Sequence[str]
 ) -> int:
     """Writes or checks the files of a robot."""
-    from pvid.codegen.files_robot import RobotFiles, refuse_large
+    from pvid.codegen.files_robot import RobotFiles, refuse_in_c
     from pvid.configuration.robot_core import robot_core_design
 
-    refuse_large(compiled)
+    refuse_in_c(compiled)
     design = None if recording is None else robot_core_design(compiled, recording)
     files = RobotFiles(compiled, "".join(["pvid model build ", compiled.name, *given]), design)
     refusals = {"fixed point": "a robot is identified in float32 alone"}

@@ -29,8 +29,10 @@ CORE = ("elementary_f32", "finite_f32", "fnv", "publication", "robot_f32")
 _VERBS = ("init", "step", "gap", "read", "covariance", "hash")
 
 
-def refuse_large(model: CompiledModel) -> None:
-    """PvidError for a robot with more base parameters than the C core takes."""
+def refuse_in_c(model: CompiledModel) -> None:
+    """PvidError for a robot on a free base, or with more base parameters than the C core takes."""
+    if model.chain is not None and model.chain.free:
+        raise PvidError(f"{model.name} has a free base: the C core takes robots on a fixed one; `pvid identify` both")
     if len(model.unknowns) > MOST_P:
         raise PvidError(
             f"{model.name} has {len(model.unknowns)} base parameters and the C core takes at most {MOST_P}: hold "
@@ -40,6 +42,9 @@ def refuse_large(model: CompiledModel) -> None:
 
 def board_report(model: CompiledModel) -> str:
     """What it costs on a board, for `pvid model check`."""
+    assert model.chain is not None
+    if model.chain.free:
+        return "On a board: not in C, which has robots on a fixed base."
     if len(model.unknowns) > MOST_P:
         return f"On a board: not in C, which takes at most {MOST_P} base parameters."
     files = RobotFiles(model, "")

@@ -147,6 +147,8 @@ class Task:
 
     def __init__(self, model: CompiledModel, series: Series, noise: Float | None = None) -> None:
         chain = _chain_of(model)
+        if chain.free:
+            raise PvidError("a motion is designed for robots on a fixed base, and this base is free")
         self.model, self.chain, self.series, self.n = model, chain, series, len(chain.joints)
         self.low, self.high, self.speed = (np.array(one) for one in zip(*map(_reach, chain.joints), strict=True))
         self.columns = [one.standard for one in chain.base]

@@ -16,10 +16,10 @@ from pvid.base.wording import listed, with_unit
 from pvid.identification.answer import Answer, Factors, Float, Value
 from pvid.identification.bodies import Bodies, bodies_of
 from pvid.identification.sensor_prediction import SensorPrediction
-from pvid.model.chain import INERTIAL
+from pvid.model.chain import INERTIAL, WRENCH
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.missing import student
-from pvid.oracle.weak.robot import LAWS, Lacking, RobotFit, RobotRun, identify_robot
+from pvid.oracle.weak.robot import Lacking, RobotFit, RobotRun, identify_robot, terms_of
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 
@@ -33,12 +33,14 @@ _WORDS = {
     "1": "{size} at all times: an offset of its sensor, or a load",
     "abs(v)*v": "{size} * abs(v)*v of its rate v: drag",
     "slow": "{size} at low speed: friction that is not dry plus viscous; move faster",
+    "v": "{size} * its rate: drag",
 }
-_UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2", "slow": ""}
+_UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2", "slow": "", "v": "*s/{unit}"}
 _SEEN = 1e-6  # relative size of a direction that the torques depend on
 _CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
 _PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-_EXPLAINED = 0.9  # R^2 of a torque below which the equations do not explain it
+_EXPLAINED = 0.9  # R^2 of a torque below which the equations do not explain it,
+_NOISY = 1.5  # where the residual is larger than what the noise of the encoders makes of the torque
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,7 @@ class RobotAnswer(Answer):
     @cached_property
     def verdict(self) -> Verdict:
         """What the run does not determine, and what contradicts itself."""
-        names, fit = self.model.p_names, self.fit
+        names, fit, chain = self.model.p_names, self.fit, self.fit.run.chain
         lost = [name for name, one in zip(names, fit.undetermined, strict=True) if one]
         if len(lost) == len(names):
             return Verdict((Reason("not_identified", "the motion determines no parameter: do the joints move?"),))
@@ -95,19 +97,20 @@ class RobotAnswer(Answer):
         worst = int(np.argmax(fit.design.still))
         if fit.design.still[worst] > _STILL:
             text = (
-                f"q{worst + 1} stays on one count in {fit.design.still[worst]:.0%} of the samples: its rounding is "
-                "then no white noise, and standard errors, most of all of friction, may be too small; move faster, or "
-                "record with more bits"
+                f"{chain.position(worst)} stays on one count in {fit.design.still[worst]:.0%} of the samples: its "
+                "rounding is then no white noise, and standard errors, most of all of friction, may be too small; move "
+                "faster, or record with more bits"
             )
             reasons.append(Reason("sensor", text))
         values = [self.values[name] for name in names]
         sd = np.array([math.hypot(it.se_noise or math.inf, it.se_scale or 0.0) for it in values])
         for one in sure(fit):
             moved = [k for k in np.argsort(-np.abs(one.shift) / sd) if abs(one.shift[k]) > sd[k]]
-            slides = self.model.chain is not None and self.model.chain.joints[one.joint].prismatic
+            slides = chain.joints[one.joint].prismatic
             unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")
-            size = _WORDS[one.law].format(size=with_unit(one.size, unit, 3), joint=one.joint + 1)
-            text = f"the torque of joint {one.joint + 1} has what the equations lack, {size}"
+            number = chain.number(one.joint)
+            size = _WORDS[one.law].format(size=with_unit(one.size, unit, 3), joint=number)
+            text = f"{chain.force(one.joint)} has what the equations lack, {size}"
             if moved:
                 k = moved[0]
                 text += f"; with that {names[k]} would be {fit.p[k] + one.shift[k]:.4g} in place of {fit.p[k]:.4g}"
@@ -119,7 +122,18 @@ class RobotAnswer(Answer):
                     of=tuple(names[k] for k in moved),
                 )
             )
+        idle = [chain.number(k) for k in fit.run.idle if k >= chain.free]
+        if idle:
+            text = f"the torque of joint {listed(map(str, idle))} is 0 at all times: taken as driven by nothing"
+            reasons.append(Reason("sensor", text, alarm=False))
         weak = [one.name for one in self.prediction if one.r2 < _EXPLAINED]
+        if weak:  # the rates' noise may be all that is not explained
+            pieces = zip(fit.predicted(fit.run, fit.p[np.newaxis]), fit.predicted(fit.run, fit.p[np.newaxis], 0),
+                         strict=True)  # fmt: skip
+            blurred = np.concatenate([(one - other)[:, 0] for (_, one), (_, other) in pieces], axis=1)
+            noise = np.delete(np.sqrt(np.mean(blurred**2, axis=1)), fit.run.idle)
+            weak = [one.name for one, sd in zip(self.prediction, noise, strict=True)
+                    if one.r2 < _EXPLAINED and one.rms > _NOISY * sd]  # fmt: skip
         if weak:
             text = (
                 f"less than {_EXPLAINED:.0%} of {listed(weak)} is explained on unseen motion: check signs, units, gear "
@@ -191,7 +205,7 @@ class RobotAnswer(Answer):
         joints = [one.name for one in chain.joints]
         bodies = None if self.bodies is None else {
             name: dict(zip(INERTIAL, map(float, one), strict=True))
-            for name, one in zip(joints, self.bodies.inertial, strict=True)
+            for name, one in list(zip(joints, self.bodies.inertial, strict=True))[max(chain.free - 1, 0) :]
         }  # fmt: skip
         return out | {
             "bodies": bodies,
@@ -205,7 +219,7 @@ class RobotAnswer(Answer):
 
 def sure(fit: RobotFit) -> tuple[Lacking, ...]:
     """The terms that are missing, with the sizes that they have together."""
-    limit = student(_APART * fit.windows, _CHANCE / 2 / (len(LAWS) * len(fit.run.chain.joints)))
+    limit = student(_APART * fit.windows, _CHANCE / 2 / len(terms_of(fit.run.chain)))
     found: tuple[Lacking, ...] = ()
     for together in fit.lacking:
         if together[-1].t <= limit:
@@ -245,9 +259,11 @@ def _moved(fit: RobotFit) -> Float:
 
 def _gains(model: CompiledModel) -> Float:
     """Relative standard deviations of the torques [n]."""
-    signals = [one.gain_sd for one in model.signals if one.kind == "input"]
+    assert model.chain is not None
+    signals = {one.name: one.gain_sd for one in model.signals if one.kind == "input"}
     constants = {one.name: one.sd / abs(one.value) for one in model.knowns if one.value}
-    return np.array([math.hypot(sd, constants.get(f"kt{k + 1}", 0.0)) for k, sd in enumerate(signals)])
+    out = [signals.pop(one, 0.0) for one in WRENCH][: model.chain.free]
+    return np.array(out + [math.hypot(sd, constants.get(f"kt{k}", 0.0)) for k, sd in enumerate(signals.values(), 1)])
 
 
 def payload_of(loaded: RobotAnswer, empty: RobotAnswer) -> dict[str, Value]:
@@ -334,9 +350,12 @@ def torques_of(
         left += np.sum((measured - own) ** 2, axis=1)
         moved += np.sum((measured - measured.mean(axis=1, keepdims=True)) ** 2, axis=1)
         size += len(place)
-    out = []
-    for k, joint in enumerate(run.chain.joints):
+    out, chain = [], run.chain
+    for k, joint in enumerate(chain.joints):
+        if k in run.idle:
+            continue
         part = float(np.sqrt(left[k] / max(moved[k], 1e-300)))
         rms = float(np.sqrt(left[k] / size))
-        out.append(SensorPrediction(f"tau{k + 1}", "N" if joint.prismatic else "N*m", rms, part, None))
+        name = f"tau{chain.number(k)}" if k >= chain.free else chain.force(k).removeprefix("the ")
+        out.append(SensorPrediction(name, "N" if joint.prismatic else "N*m", rms, part, None))
     return tuple(out)

@@ -38,7 +38,7 @@ _PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 @dataclass(frozen=True)
 class Source:
     """A robot's file to write again: the name of its model file, its path, what it has, the text before its root, the
-    root, and the elements of each of MuJoCo's bodies and of each joint that moves."""
+    root, and the elements of each of MuJoCo's bodies and of each joint that moves; None: of the six of a free base."""
 
     model: str
     path: Path
@@ -46,7 +46,7 @@ class Source:
     head: str
     root: ElementTree.Element
     bodies: Sequence[ElementTree.Element | None]
-    joints: Sequence[ElementTree.Element]
+    joints: Sequence[ElementTree.Element | None]
 
 
 def source_of(mechanism: Mechanism, out: Path) -> Source:
@@ -64,7 +64,10 @@ def source_of(mechanism: Mechanism, out: Path) -> Source:
     path = place.parent / model.file
     if out.suffix != path.suffix:
         raise PvidError(f"{out}: of a robot its own file is written, {path.name}: the name ends with {path.suffix}")
-    robot = placed(path, [one.name for one in model.joints], fused=False)
+    free = sum(one.free for one in model.joints)
+    robot = placed(path, [one.name for one in model.joints[free:]], fused=False, free_base=free > 0)
+    if len(robot.joints) != len(model.joints):
+        raise PvidError(f"{path}: its base is free, and that of {place.name} is not; repeat `pvid model from`")
     for k, joint in enumerate(model.joints):
         read = zip((joint.axis, joint.origin, joint.turned), robot.joint(k), strict=True)
         same = all(np.abs(np.array(one) - other).max() < _PLACE for one, other in read)
@@ -85,7 +88,7 @@ def source_of(mechanism: Mechanism, out: Path) -> Source:
     if root.tag == "robot":
         links, tied = ({one.get("name"): one for one in root.findall(tag)} for tag in ("link", "joint"))
         of_body += [links[robot.model.body(k).name] for k in range(1, robot.model.nbody)]
-        joints = [tied[robot.model.joint(k).name] for k in robot.joints]
+        joints = [tied[robot.model.joint(k).name] for k in robot.joints[robot.free :]]
     else:
         for world in root.findall("worldbody"):
             of_body += _within(world, "body", deep=True)
@@ -93,12 +96,13 @@ def source_of(mechanism: Mechanism, out: Path) -> Source:
             raise PvidError(
                 f"{path}: has bodies that an include, attach or replicate makes: write it as one MJCF first"
             )
-        bodies = [int(robot.model.jnt_bodyid[k]) for k in robot.joints]
+        moving = robot.joints[robot.free :]
+        bodies = [int(robot.model.jnt_bodyid[k]) for k in moving]
         joints = [
             list(_within(of_body[body], "joint"))[k - int(robot.model.body_jntadr[body])]  # type: ignore[arg-type]
-            for k, body in zip(robot.joints, bodies, strict=True)
+            for k, body in zip(moving, bodies, strict=True)
         ]
-    return Source(place.name, path, robot, data[: starts[0]].decode(), root, of_body, joints)
+    return Source(place.name, path, robot, data[: starts[0]].decode(), root, of_body, [*([None] * robot.free), *joints])
 
 
 def write_robot(answer: RobotAnswer, source: Source, out: Path, made: str) -> list[str]:
@@ -139,11 +143,12 @@ def write_robot(answer: RobotAnswer, source: Source, out: Path, made: str) -> li
     attributes = _URDF if source.root.tag == "robot" else _MJCF
     units, lacking = {(one.kind, one.joint): one.unit for one in chain.standard}, []
     for (kind, k), value in values.items():
-        if kind in attributes:
-            element = _child(source.joints[k], "dynamics") if attributes is _URDF else source.joints[k]
+        joint = source.joints[k]
+        if kind in attributes and joint is not None:
+            element = _child(joint, "dynamics") if attributes is _URDF else joint
             element.set(attributes[kind], repr(value))
         elif value:
-            lacking.append(f"{kind}{k + 1} = {with_unit(value, units[kind, k], 4)}")
+            lacking.append(f"{kind}{chain.number(k)} = {with_unit(value, units[kind, k], 4)}")
     lost = [name for name, one in zip(answer.model.p_names, answer.fit.undetermined, strict=True) if one]
     told = {"not determined by the motion, as in that file or near it": lost}
     told |= {"without a place in such a file": lacking}
@@ -155,7 +160,7 @@ def write_robot(answer: RobotAnswer, source: Source, out: Path, made: str) -> li
     with appearing(out) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="")
         try:
-            again = placed(temporary, robot.names)
+            again = placed(temporary, robot.names[robot.free :], free_base=robot.free > 0)
         except PvidError as error:
             why = str(error).replace(str(temporary), "it")
             raise PvidError(f"{out}: is not written: files that it names are sought beside it, and {why}") from None

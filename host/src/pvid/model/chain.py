@@ -31,6 +31,9 @@ _OF_FILE = ("Fv", "Fc")
 _SNAPPED = 1e-12  # what is as close to 0 or 1 is that
 _DEPENDENT = 1e-9  # part of a column that is left when the columns before it explain it
 _STATES = 60  # random ones, whose rows decide what depends on what
+# Of a free base: where its body's frame is in the inertial one (turned by yaw about z, then pitch about y, then roll
+# about x), and the force and the moment about its origin that act on the body from outside, in its frame.
+POSE, WRENCH = ("x", "y", "z", "yaw", "pitch", "roll"), ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ class Joint:
     speed, torque : their largest sizes [rad/s, m/s], [N*m, N]; None: no limit
     noise : of the recorded torque [N*m, N]; None: not known
     points : of the body, in its frame, that stay in the box [m]
+    free : it is one of POSE, without a drive, friction, or (but the last) a body
     """
 
     name: str
@@ -71,20 +75,17 @@ class Joint:
     torque: float | None = None
     noise: float | None = None
     points: tuple[tuple[float, float, float], ...] = ()
+    free: bool = False
 
 
 @dataclass(frozen=True)
 class Standard:
-    """A parameter of a joint or body, as the file has it: place of the joint, name without it, unit."""
+    """A parameter of a joint or body, as the file has it: place of the joint, name as in Ixx2, kind as in Ixx, unit."""
 
     joint: int
+    name: str
     kind: str
     unit: str
-
-    @property
-    def name(self) -> str:
-        """As in Ixx2."""
-        return f"{self.kind}{self.joint + 1}"
 
 
 @dataclass(frozen=True)
@@ -103,12 +104,31 @@ class Base:
 
 @dataclass(frozen=True)
 class Chain:
-    """A robot on a fixed base: joints from the base outwards, gravity [m/s^2], and the lowest and highest corner of the
-    box that its points must not leave, in the base's frame [m]; None: no box."""
+    """A robot: joints from the base outwards, those of a free base first; gravity [m/s^2], and the lowest and highest
+    corner of the box that its points must not leave, in the base's frame [m]; None: no box."""
 
     joints: tuple[Joint, ...]
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+
+    @cached_property
+    def free(self) -> int:
+        """How many joints are of a free base: 6 or 0."""
+        return sum(one.free for one in self.joints)
+
+    def number(self, joint: int) -> int:
+        """Of a joint, from 1; the body of a free base has 0."""
+        return joint + 1 - self.free
+
+    def position(self, joint: int) -> str:
+        """Name of its signal."""
+        return POSE[joint] if joint < self.free else f"q{self.number(joint)}"
+
+    def force(self, joint: int) -> str:
+        """What acts along a joint, in words."""
+        if joint >= self.free:
+            return f"the torque of joint {self.number(joint)}"
+        return f"the {'force along' if self.joints[joint].prismatic else 'moment about the axis of'} {POSE[joint]}"
 
     @cached_property
     def standard(self) -> tuple[Standard, ...]:
@@ -118,6 +138,8 @@ class Chain:
         """
         out = []
         for k, joint in enumerate(self.joints):
+            if k < self.free - 1:
+                continue
             along = int(np.argmax(np.abs(joint.axis)))
             across = "xyz"[(along + 2) % 3]
             last = [f"I{across}{across}", f"h{'xyz'[along]}", "m"]
@@ -125,10 +147,11 @@ class Chain:
             first = [one for one in dict.fromkeys(ranked) if one not in last]
             torque = "N" if joint.prismatic else "N*m"
             units = {"m": "kg", "h": "kg*m", "I": "kg*m^2"}
-            out += [Standard(k, one, units[one[0]]) for one in [*first, *last]]
-            out += [Standard(k, "Ia", "kg" if joint.prismatic else "kg*m^2")] if joint.rotor is not None else []
-            out += [Standard(k, "Fv", "N*s/m" if joint.prismatic else "N*m*s"), Standard(k, "Fc", torque)]
-            out += [Standard(k, "Offset", torque)] if joint.offset else []
+            kinds = {one: units[one[0]] for one in [*first, *last]}
+            kinds |= {"Ia": "kg" if joint.prismatic else "kg*m^2"} if joint.rotor is not None else {}
+            kinds |= {} if joint.free else {"Fv": "N*s/m" if joint.prismatic else "N*m*s", "Fc": torque}
+            kinds |= {"Offset": torque} if joint.offset else {}
+            out += [Standard(k, f"{kind}{self.number(k)}", kind, unit) for kind, unit in kinds.items()]
         return tuple(out)
 
     @property

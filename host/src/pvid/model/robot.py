@@ -1,4 +1,4 @@
-"""A robot on a fixed base: joints with encoders, each driven by a torque that is recorded."""
+"""A robot on a fixed or a free base: joints with encoders, each driven by a torque that is recorded."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import sympy as sp
 
-from pvid.model.chain import INERTIAL, Base, Chain, Joint, rotation_of
+from pvid.model.chain import INERTIAL, POSE, WRENCH, Base, Chain, Joint, rotation_of
 from pvid.model.compiled import CompiledModel, Unknown
 from pvid.model.description import Model
 
@@ -22,12 +22,14 @@ class Robot(Model):
     """A mechanism of rigid bodies in a tree of joints; `compiled` has its base parameters as unknowns.
 
     The signals are q1, tau1, q2, tau2, .. in the order of the joints; a joint with a torque constant has a current i1
-    in place of tau1. `file` is the URDF or MJCF file that it is from, by the path from its model file: identified
-    values can be written to a copy of it.
+    in place of tau1. A free base has x, y, z, yaw, pitch and roll before them. `file` is the URDF or MJCF file that it
+    is from, by the path from its model file: identified values can be written to a copy of it.
     """
 
     def __init__(self, title: str, gravity: Sequence[float] = (0.0, 0.0, -9.81), file: str | None = None) -> None:
         super().__init__(title)
+        if file is not None and not isinstance(file, str):
+            raise self._refused(f"file: the path of a URDF or MJCF file is needed, not {file}")
         self.file = file
         self.joints: list[Joint] = []
         self.gravity = self._three("gravity", gravity)
@@ -38,6 +40,49 @@ class Robot(Model):
         self.space = self._three("box: low", low), self._three("box: high", high)
         if not all(one < other for one, other in zip(*self.space, strict=True)):
             raise self._refused(f"box: {tuple(low)} is not below {tuple(high)}")
+
+    def free_base(
+        self,
+        name: str,
+        inertial: Sequence[float] | None = None,
+        wrench: bool = False,
+        hold: Literal["zoh", "sampled"] = "sampled",
+        resolution: tuple[float, float] = (1e-3, 1e-3),
+    ) -> None:
+        """A body that is fixed to nothing, before all joints: a drone, a satellite, a robot that floats.
+
+        Its signals are the place x, y, z [m] of its frame in the inertial one, and yaw, pitch and roll [rad]: it is
+        turned by yaw about z, then by pitch about y, then by roll about x.
+
+        Parameters
+        ----------
+        inertial : as of `joint`; the parameters of this body have the number 0
+        wrench : the force fx, fy, fz [N] and the moment about the frame's origin mx, my, mz [N*m] that act on the body
+            from outside (thrust), in the body's frame, are recorded; without it nothing but gravity acts
+        hold : "zoh" for a wrench that is commanded and held from sample to sample
+        resolution : of place and angles [m], [rad]
+        """
+        if self.joints:
+            raise self._refused(f"{name}: a free base comes before all joints, and once")
+        given = self._inertial(name, inertial)
+        for k, pose in enumerate(POSE):
+            slides = k < 3
+            self.sensor(pose, "m" if slides else "rad", resolution=resolution[not slides], reach=math.pi, gain_sd=0.0)
+            axis = [float(k % 3 == (place if slides else 2 - place)) for place in range(3)]
+            self.joints.append(
+                Joint(
+                    name if k == len(POSE) - 1 else f"{name}_{pose}",
+                    k - 1,
+                    (axis[0], axis[1], axis[2]),
+                    (0.0, 0.0, 0.0),
+                    rotation_of((0.0, 0.0, 0.0)),
+                    prismatic=slides,
+                    inertial=given if k == len(POSE) - 1 else (0.0,) * len(INERTIAL),
+                    free=True,
+                )
+            )
+        for k, one in enumerate(WRENCH if wrench else ()):
+            self.input(one, "N" if k < 3 else "N*m", hold=hold, reach=100.0)
 
     def joint(
         self,
@@ -81,21 +126,21 @@ class Robot(Model):
         noise : of the recorded torque [N*m]; a hundredth of `torque` by default
         points : of the body, in its frame, that stay in the box [m]; its centre of mass by default
         """
-        number = len(self.joints) + 1
+        free = sum(one.free for one in self.joints)
+        number = len(self.joints) + 1 - free
         if number > MOST_JOINTS:
             raise self._refused(f"a robot has at most {MOST_JOINTS} joints")
         names = [one.name for one in self.joints]
         if name in names:
             raise self._refused(f"the joint {name} is there twice")
-        if parent not in (None, "base", *names):
-            raise self._refused(f"{name}: its parent {parent} is no joint before it")
+        carriers = names[max(free - 1, 0) :] if free else ["base", *names]
+        if parent not in (None, *carriers):
+            raise self._refused(f"{name}: its parent {parent} is none of {', '.join(carriers)}")
         along = np.array(self._three(f"{name}: axis", axis))
         size = float(np.linalg.norm(along))
         if abs(size - 1) > _UNIT:
             raise self._refused(f"{name}: the axis {tuple(axis)} must have the length 1, not {size:g}")
-        given = None if inertial is None else tuple(float(one) for one in inertial)
-        if given is not None and (len(given) != len(INERTIAL) or not np.isfinite(given).all()):
-            raise self._refused(f"{name}: inertial has {len(INERTIAL)} numbers: {', '.join(INERTIAL)}")
+        given = self._inertial(name, inertial)
         speed, torque, noise = (
             self._positive(f"{name}: {what}", value)
             for what, value in (("speed", speed), ("torque", torque), ("noise", noise))
@@ -116,7 +161,7 @@ class Robot(Model):
         self.joints.append(
             Joint(
                 name,
-                number - 2 if parent is None else -1 if parent == "base" else names.index(parent),
+                len(self.joints) - 1 if parent is None else -1 if parent == "base" else names.index(parent),
                 (along[0] / size, along[1] / size, along[2] / size),
                 self._three(f"{name}: origin", origin),
                 rotation_of(self._three(f"{name}: rpy", rpy)),
@@ -135,8 +180,10 @@ class Robot(Model):
 
     def compiled(self, name: str = "") -> CompiledModel:
         """Its base parameters and signals; rows are computed by recursion (pvid.model.chain)."""
-        if not self.joints:
-            raise self._refused(f"{self.title}: the robot has no joint")
+        if all(one.free for one in self.joints):
+            what = "the free base has neither a joint nor a wrench" if self.joints else "the robot has no joint"
+            if not any(one.kind == "input" for one in self.signals):
+                raise self._refused(f"{self.title}: {what}")
         chain = Chain(tuple(self.joints), self.gravity, self.space)
         return CompiledModel(
             name or "robot",
@@ -149,6 +196,17 @@ class Robot(Model):
             clock_sd=0.0,
             chain=chain,
         )
+
+    def _inertial(self, name: str, given: Sequence[float] | None) -> tuple[float, ...] | None:
+        if given is None:
+            return None
+        try:
+            out = tuple(float(one) for one in given)
+        except (TypeError, ValueError):
+            out = ()
+        if len(out) != len(INERTIAL) or not np.isfinite(out).all():
+            raise self._refused(f"{name}: inertial has {len(INERTIAL)} numbers: {', '.join(INERTIAL)}")
+        return out
 
     def _two(self, what: str, given: Sequence[float] | None) -> tuple[float, float] | None:
         if given is None:

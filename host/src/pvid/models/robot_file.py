@@ -17,6 +17,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.packages import lacking
 from pvid.base.wording import listed, printable, reason
+from pvid.model.chain import POSE
 from pvid.model.robot import MOST_JOINTS
 
 Float = npt.NDArray[np.float64]
@@ -27,6 +28,8 @@ _LEAST_SECOND, _ROUGH = 1e-12, 1e-6  # [kg*m^2]; of the largest second moment
 _LOCKED = 1e-6  # cosine of the pitch below which roll and yaw turn about one axis
 _LEAST_MASS = 1e-11  # [kg]
 _SLIDES = 2  # mjJNT_SLIDE
+_SLIDES_FREE = 3  # of POSE
+_INERTIAL = "inertial"  # link and joint that are put before a free base of URDF
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,8 @@ class Placed:
     model, data : MuJoCo's
     speeds, notes : that URDF allows; what was changed
     bare : names of bodies whose inertia the file does not have
-    joints, names : MuJoCo's numbers of those that move, and their names
+    joints, names : MuJoCo's numbers of those that move, and their names; the six of a free base first
+    free : how many these six are: 6 or 0
     before : of each the place of the joint that carries it; -1: the base
     carrier : of each body the place of the joint that moves it; -1: it rests
     frames : of each joint's body its origin on the axis, and its rotation; the last is the base's
@@ -51,6 +55,7 @@ class Placed:
     bare: Collection[str]
     joints: Sequence[int]
     names: Sequence[str]
+    free: int
     before: Sequence[int]
     carrier: Sequence[int]
     frames: Sequence[tuple[Float, Float]]
@@ -75,15 +80,21 @@ class Placed:
         own = self.bodies(place) if bodies is None else bodies
         return _inertial(self.model, self.data, own, *self.frames[place])
 
+    def knows(self, place: int) -> bool:
+        """Whether the file has the inertias of all that a joint moves."""
+        own = [k for k in self.bodies(place) if self.model.body(k).name in self.bare]
+        tied = place < self.free and all(self.model.body_mass[k] > 2 * _LEAST_MASS for k in own)
+        return not own or tied  # the first link of a URDF has often none, and the body is a link that is fixed to it
+
     def bodies(self, place: int) -> list[int]:
         """MuJoCo's numbers of all that a joint moves, up to the next joint that does."""
         return [k for k, one in enumerate(self.carrier) if one == place]
 
 
-def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Placed:
-    """A robot's file.
+def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True, free_base: bool = False) -> Placed:
+    """A robot's file. A free joint becomes six, in the order of pvid.model.chain.POSE.
 
-    Raises PvidError where it cannot be read, or is no robot on a fixed base with known inertias.
+    Raises PvidError where it cannot be read, or is no tree of joints of one axis.
 
     Parameters
     ----------
@@ -91,9 +102,10 @@ def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Pla
     chosen : names of the joints that move and are recorded, in the order of the columns; others are held at their zero;
         (): all
     fused : links of URDF that fixed joints tie are one body
+    free_base : the first link of URDF is fixed to nothing, as it is where a joint says so
     """
-    mujoco, model, speeds, notes, bare = _read(path, fused=fused)
-    joints = _chosen(mujoco, model, path, chosen)
+    mujoco, model, speeds, notes, bare = _read(path, chosen, fused=fused, free_base=free_base)
+    first, joints = _chosen(mujoco, model, path, chosen)
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr] = 0.0
     mujoco.mj_kinematics(model, data)
@@ -107,7 +119,7 @@ def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True) -> Pla
     frames = [(data.xanchor[k].copy(), data.xmat[int(model.jnt_bodyid[k])].reshape(3, 3)) for k in joints]
     names = [_names(model)[joint] for joint in joints]
     base = (np.zeros(3), np.eye(3))
-    return Placed(model, data, speeds, notes, bare, joints, names, before, carrier, [*frames, base])
+    return Placed(model, data, speeds, notes, bare, joints, names, first, before, carrier, [*frames, base])
 
 
 def model_text(path: Path, chosen: Sequence[str] = (), folder: Path | None = None) -> str:
@@ -120,7 +132,7 @@ def text_of(robot: Placed, path: Path, folder: Path | None = None) -> str:
     model, names = robot.model, robot.names
     source = os.path.relpath(path, folder or path.parent).replace(os.sep, "/")
     lines = [
-        json.dumps(f"{printable(path.name)}: {len(names)} joints, by `pvid model from`."),
+        json.dumps(f"{printable(path.name)}: {len(names) - robot.free} joints, by `pvid model from`."),
         "",
         "from pvid.model import Robot, pi",
         "",
@@ -128,7 +140,14 @@ def text_of(robot: Placed, path: Path, folder: Path | None = None) -> str:
         f"model = Robot({json.dumps(printable(path.stem))}, gravity={_numbers(model.opt.gravity)}, "
         f"file={json.dumps(source)})",
     ]
+    if robot.free:
+        last, name = robot.free - 1, names[robot.free - 1]
+        inertial = f", inertial={_numbers(robot.inertial(last))}" if robot.knows(last) else ""
+        lines += ["# wrench=True: fx, fy, fz, mx, my, mz, which act on this body from outside, are recorded",
+                  f"model.free_base({json.dumps(name)}{inertial})"]  # fmt: skip
     for place, (joint, name) in enumerate(zip(robot.joints, names, strict=True)):
+        if place < robot.free:
+            continue
         axis, at, turned = robot.joint(place)
         given = {"axis": _numbers(axis)}
         given |= {"origin": origin} if (origin := _numbers(at)) != "(0, 0, 0)" else {}
@@ -149,13 +168,15 @@ def text_of(robot: Placed, path: Path, folder: Path | None = None) -> str:
         if model.jnt_actfrclimited[joint] and (most := min(abs(model.jnt_actfrcrange[joint]))) > 0:
             given["torque"] = _number(most)
         first = ", ".join([json.dumps(name), *(f"{key}={value}" for key, value in given.items())])
-        known = not any(model.body(k).name in robot.bare for k in robot.bodies(place))
+        known = robot.knows(place)
         lines += [f"model.joint({first}{',' if known else ')'}"]
         lines += [f"            inertial={_numbers(robot.inertial(place))})"] * known
     return "\n".join([*lines, ""])
 
 
-def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float], list[str], list[str]]:
+def _read(
+    path: Path, chosen: Sequence[str], *, fused: bool, free_base: bool
+) -> tuple[Any, Any, dict[str, float], list[str], list[str]]:
     """MuJoCo, its model of a file, and what `prepared_urdf` returns of URDF; what is only drawn is not needed
     of URDF."""
     try:
@@ -176,6 +197,8 @@ def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float]
             speeds, notes, bare = prepared_urdf(tree)
         except ValueError as error:
             raise PvidError(f"{path}: is no URDF file: {printable(reason(error))}") from None
+        if free_base:
+            _set_free(tree)
         if not fused:
             options = tree
             for name in ("mujoco", "compiler"):
@@ -185,10 +208,15 @@ def _read(path: Path, *, fused: bool = True) -> tuple[Any, Any, dict[str, float]
     usual = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: notes.append(printable(text)))  # or it writes a file into this folder
     try:
-        if tree.tag == "robot":
-            model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
-        else:
-            model = mujoco.MjModel.from_xml_path(str(path))
+        urdf = ElementTree.tostring(tree, encoding="unicode") if tree.tag == "robot" else None
+        model = mujoco.MjModel.from_xml_string(urdf) if urdf else mujoco.MjModel.from_xml_path(str(path))
+        if (joint := _free_joint(mujoco, model, path, chosen)) is not None:
+            spec = mujoco.MjSpec.from_string(urdf) if urdf else mujoco.MjSpec.from_file(str(path))
+            spec.compile()
+            _split(mujoco, spec, joint)
+            model = spec.compile()
+        elif free_base:
+            raise PvidError(f"{path}: has no free joint, which MJCF has for a free base")
     except ValueError as error:
         raise PvidError(f"{path}: MuJoCo does not read it: {printable(reason(error))}") from None
     finally:
@@ -256,12 +284,51 @@ def _names(model: Any) -> list[str]:
     return [printable(model.joint(one).name or f"joint{one + 1}") for one in range(model.njnt)]
 
 
-def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[int]:
-    """Numbers of the joints, those of a body before those that it carries."""
+def _set_free(tree: ElementTree.Element) -> None:
+    """Ties the first link of a URDF to nothing, unless a joint does so."""
+    if any(one.get("type") == "floating" for one in tree.findall("joint")):
+        return
+    moved = {child.get("link") for child in tree.iterfind("joint/child")}
+    first = next((one.get("name", "") for one in tree.iter("link") if one.get("name") not in moved), "")
+    ElementTree.SubElement(tree, "link", name=_INERTIAL)
+    joint = ElementTree.SubElement(tree, "joint", name=_INERTIAL, type="floating")
+    ElementTree.SubElement(joint, "parent", link=_INERTIAL)
+    ElementTree.SubElement(joint, "child", link=first)
+
+
+def _free_joint(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> int | None:
+    """That of the free base: the only one that carries joints that move, or that there is; None: no base is free."""
+    free = [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_FREE]
     names = _names(model)
+    others = [k for k in range(model.njnt) if k not in free and (not chosen or names[k] in chosen)]
+    carrying = [k for k in free if any(_is_under(model, one, k) for one in others)]
+    if len(carrying) > 1 or (not others and len(free) > 1):
+        raise PvidError(
+            f"{path}: {listed(names[k] for k in carrying or free)} are free: a robot has one free base; name the "
+            "joints of one robot by --joints"
+        )
+    return carrying[0] if carrying else free[0] if free and not others else None
+
+
+def _split(mujoco: Any, spec: Any, number: int) -> None:
+    """Makes six joints of a free joint, whose body's frame is the inertial one where they are 0."""
+    joint = next(one for one in spec.joints if one.id == number)
+    body, base = joint.parent, printable(joint.parent.name) or "base"
+    spec.delete(joint)
+    base += "_body" if base in [one.name for one in spec.joints] else ""
+    body.pos, body.quat = np.zeros(3), np.eye(4)[0]
+    for k, pose in enumerate(POSE):
+        kind = mujoco.mjtJoint.mjJNT_SLIDE if k < _SLIDES_FREE else mujoco.mjtJoint.mjJNT_HINGE
+        axis = np.eye(3)[k if k < _SLIDES_FREE else len(POSE) - 1 - k]
+        added = body.add_joint(name=base if k == len(POSE) - 1 else f"{base}_{pose}", type=kind, axis=axis)
+        added.pos = np.zeros(3)  # a class of the file may have another
+
+
+def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> tuple[int, list[int]]:
+    """How many joints are of a free base, and the numbers of all, those of a body before those that it carries."""
+    names = _names(model)
+    base = _free_joints(names)
     for one in range(model.njnt):
-        if model.jnt_type[one] == mujoco.mjtJoint.mjJNT_FREE:
-            raise PvidError(f"{path}: its base floats (a free joint): only robots on a fixed base are identified")
         if model.jnt_type[one] == mujoco.mjtJoint.mjJNT_BALL:
             raise PvidError(f"{path}: {printable(names[one])} is a ball joint: only joints of one axis are identified")
     for name in chosen:
@@ -269,8 +336,10 @@ def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[
             raise PvidError(
                 f"{path}: there is no joint {printable(name)}: it has {listed(map(printable, names or ['none']))}"
             )
-    joints = [names.index(one) for one in chosen] if chosen else list(range(model.njnt))
-    if not joints:
+    free = [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_FREE]  # of other things
+    joints = [names.index(one) for one in chosen] if chosen else [
+        k for k in range(model.njnt) if k not in free and k not in base]  # fmt: skip
+    if not joints and not base:
         raise PvidError(f"{path}: no joint moves")
     for place, joint in enumerate(joints):
         if any(_is_under(model, one, joint) for one in joints[:place]):
@@ -280,12 +349,24 @@ def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> list[
             f"{path}: {len(joints)} joints are more than {MOST_JOINTS}: choose some of them with --joints: "
             f"{','.join(names)}"
         )
+    loose = [names[k] for k in joints if base and not _is_under(model, k, base[-1])]
+    if loose:
+        raise PvidError(f"{path}: {listed(loose)} move on a fixed base, and another base is free: one robot at a time")
     for one in joints:
         if model.jnt_stiffness[one] > 0:
             raise PvidError(
                 f"{path}: {printable(names[one])} has a spring (stiffness), which no base parameter describes"
             )
-    return joints
+    return len(base), [*base, *joints]
+
+
+def _free_joints(names: Sequence[str]) -> list[int]:
+    """The six that `_split` made."""
+    for k in range(len(names) - len(POSE) + 1):
+        base = names[k + len(POSE) - 1]
+        if list(names[k : k + len(POSE) - 1]) == [f"{base}_{one}" for one in POSE[:-1]]:
+            return list(range(k, k + len(POSE)))
+    return []
 
 
 def _is_under(model: Any, joint: int, other: int) -> bool:

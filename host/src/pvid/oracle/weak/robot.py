@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.model.chain import Chain, friction
+from pvid.model.chain import WRENCH, Chain, friction
 from pvid.model.compiled import CompiledModel
 from pvid.model.operations import evaluated
 from pvid.oracle.weak.filters import polynomial_weights
@@ -51,6 +51,7 @@ _MOST_BYTES = 4e9  # of the rows, with what is computed from them
 _TERMS = 3  # that may be missing; as many as joints, if these are more
 ALIKE = 2.0  # times as sure: friction that is soft where that of another joint is
 _DIRECTION = 1e-6  # relative size of a direction that is one
+_UPRIGHT = 1.4  # [rad] of pitch, above which yaw and roll turn about nearly the same axis
 
 
 def _slow(_: Float, v: Float) -> Float:
@@ -63,7 +64,15 @@ LAWS: Mapping[str, Callable[[Float, Float], Float]] = {  # of positions and rate
     "1": lambda q, v: np.ones(q.shape),
     "abs(v)*v": lambda q, v: np.abs(v) * v,
     "slow": _slow,
+    "v": lambda q, v: v,
 }
+_OF_FREE = ("1", "abs(v)*v", "v")  # of the joints of a free base; the others have friction
+
+
+def terms_of(chain: Chain) -> list[tuple[str, int]]:
+    """(law, joint) of what a robot may have beyond its equations."""
+    joints = range(len(chain.joints))
+    return [(law, k) for law in LAWS for k in joints if ((law in _OF_FREE) if k < chain.free else law != "v")]
 
 
 def shortest_run(sample_rate: float) -> float:
@@ -97,7 +106,10 @@ class RobotDesign:
 
 
 class RobotRun:
-    """Positions and torques [n, samples] of each segment of a run."""
+    """Positions and torques [n, samples] of each segment of a run, and the joints that nothing drives.
+
+    Raises PvidError where a free base stands upright, or nothing drives any joint.
+    """
 
     def __init__(self, model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> None:
         assert model.chain is not None
@@ -108,14 +120,30 @@ class RobotRun:
         self.torques: list[Float] = []
         for part in segments_of(samples):
             positions, torques = [], []
-            for k in range(1, len(self.chain.joints) + 1):
+            for joint in range(len(self.chain.joints)):
+                q = samples[self.chain.position(joint)][part]
+                positions.append(np.unwrap(q) if joint in (3, 5) and joint < self.chain.free else q)
+            if self.chain.free:
+                upright = float(np.max(np.abs(positions[4])))
+                if upright > _UPRIGHT:
+                    raise PvidError(
+                        f"pitch reaches {math.degrees(upright):.0f} degrees, where yaw and roll turn about one axis: "
+                        f"turn the frame of the free base such that it stays below {math.degrees(_UPRIGHT):.0f}"
+                    )
+                wrench = [samples.get(name, np.zeros(part.stop))[part] for name in WRENCH]
+                held = any(one.name in WRENCH and one.hold == "zoh" for one in model.signals)
+                torques += _generalised(list(map(of_hold, wrench)) if held else wrench, positions[3:6])
+            for k in range(1, len(self.chain.joints) - self.chain.free + 1):
                 name = f"tau{k}" if f"tau{k}" in samples else f"i{k}"
                 held = model.signal(name).hold == "zoh"
                 torque = samples[name][part] * constants.get(f"kt{k}", 1.0)
-                positions.append(samples[f"q{k}"][part])
                 torques.append(of_hold(torque) if held else torque)
             self.positions.append(np.array(positions))
             self.torques.append(np.array(torques))
+        driven = [any(np.any(one[k]) for one in self.torques) for k in range(len(self.chain.joints))]
+        self.idle = [k for k, one in enumerate(driven) if not one]
+        if self.torques and not any(driven):
+            raise PvidError("every torque is 0 at all times: a motion without a known force has no parameters")
 
     @cached_property
     def design(self) -> RobotDesign:
@@ -207,6 +235,18 @@ class Segment:
             yield np.array([np.broadcast_to(one, rate.shape[1:]) for one in found])
 
 
+def _generalised(wrench: Sequence[Float], turned: Sequence[Float]) -> list[Float]:
+    """What a force and a moment in the frame of a free base do along its joints [6, samples], turned by yaw, pitch and
+    roll: the force along x, y and z, the moment about the axes of yaw, pitch and roll."""
+    yaw, pitch, roll = turned
+    (sy, cy), (sp, cp), (sr, cr) = ((np.sin(one), np.cos(one)) for one in (yaw, pitch, roll))
+    fx, fy, fz, mx, my, mz = wrench
+    down, across = cr * fz + sr * fy, cr * fy - sr * fz  # turned back by roll
+    ahead, down = cp * fx + sp * down, cp * down - sp * fx  # and by pitch
+    level = cr * my - sr * mz
+    return [cy * ahead - sy * across, sy * ahead + cy * across, down, cp * (sr * my + cr * mz) - sp * mx, level, mx]
+
+
 def _doubts(rate: Float, noise: float, functions: TestFunctions) -> Float:
     """Directions of the test functions that a joint's slow steps reach in each window [windows, K, K], from its rates
     [steps] and their noise; the others are 0."""
@@ -274,6 +314,7 @@ class RobotRows:
             laws = [of(segment.position, segment.rate) for of in LAWS.values()]
             others.append(np.array([functions.window_sums(one) @ tables[0] for one in laws]))
             doubts.append(np.array([_doubts(*one, functions) for one in zip(segment.rate, noise, strict=True)]))
+            doubts[-1][: run.chain.free] = 0.0  # they have no dry friction
             follows += [*([True] * (sums.shape[1] - 1)), False]
         if sum(one.shape[1] for one in parts) < _FEWEST_WINDOWS:
             raise PvidError(
@@ -370,12 +411,12 @@ class RobotFit:
         """Of a segment of a run whose torques are predicted."""
         return max(2 * run.design.functions.hop, 2 * self.design.taps + 1) + run.design.taps - 1
 
-    def predicted(self, run: RobotRun, p: Float) -> Iterator[tuple[Float, Float]]:
+    def predicted(self, run: RobotRun, p: Float, seed: int | None = None) -> Iterator[tuple[Float, Float]]:
         """Torques of each segment of a run, measured and as each of several p [.., p] gives them: [n, steps] and
-        [n, .., steps]."""
+        [n, .., steps]; `seed` as of RobotRun.values."""
         n, taps = len(run.chain.joints), 2 * self.design.taps + 1
         weights = polynomial_weights(taps, POLYNOMIAL, 1) * run.sample_rate
-        for segment in run.values(self.columns, _STEPS):
+        for segment in run.values(self.columns, _STEPS, seed):
             if segment.position.shape[1] < taps:
                 continue
             whole = np.zeros((2, n, len(p), segment.position.shape[1]))
@@ -410,6 +451,8 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     traces = np.trace(grams, axis1=1, axis2=2)[:, np.newaxis, np.newaxis]
     grams /= traces
     parts = np.array([[np.mean(one**2), 0.0, 0.0] for one in rows.known])
+    if idle := whole.idle:
+        parts[idle] = _idle_parts(whole, rows, grams)
     for _ in range(_TURNS):
         roots = np.array([_root(one, grams) for one in parts])
         white = rows.white(roots)
@@ -418,10 +461,8 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
             [np.sum(inverse(s) * np.einsum("wpk,wqk->pq", one, one, optimize=True)) for one in white.regressors]
         ) / (rows.windows * functions.count)
         left = white.residuals(solved(s, f.sum(axis=0)))
-        parts = np.array(
-            [_fitted(one.T @ one / (rows.windows * part), grams, root)
-             for one, part, root in zip(left, free, roots, strict=True)]
-        )  # fmt: skip
+        for k in set(range(len(parts))) - set(idle):
+            parts[k] = _fitted(left[k].T @ left[k] / (rows.windows * free[k]), grams, roots[k])
     uncorrected = solved(s, f.sum(axis=0))
     more_s, more_f = np.zeros(s.shape), np.zeros(f.shape)
     for seed in range(_DRAWS):
@@ -447,7 +488,8 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     covariance = covariance * np.outer(wider, wider)
     by_gain = (f - more_f) @ bread
     size = np.sqrt(np.diag(covariance) * np.diag(s))
-    undetermined = ~(size < _COVERED * np.sqrt(np.sum(white.known**2)))
+    balanced = np.sum(white.regressors[idle] ** 2, axis=(0, 1, 3)) * p**2  # what cancels where no torque is
+    undetermined = ~(size < _COVERED * np.sqrt(np.sum(white.known**2) + np.sum(balanced)))
     middle = rows.windows // 2
     halves, variances = [], []
     for part in (slice(0, middle), slice(middle, None)):
@@ -459,19 +501,20 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     apart = np.abs(halves[0] - halves[1]) / np.sqrt(np.sum(variances, axis=0))
     return RobotFit(
         whole, columns, p, covariance, by_gain, uncorrected, np.array(halves), apart, undetermined, rows.windows,
-        tuple(_lacking(white, p, bread)),
+        tuple(_lacking(white, p, bread, terms_of(whole.chain))),
     )  # fmt: skip
 
 
-def _lacking(white: RobotRows, p: Float, bread: Float) -> Iterator[tuple[Lacking, ...]]:
+def _lacking(white: RobotRows, p: Float, bread: Float, terms: list[tuple[str, int]]) -> Iterator[tuple[Lacking, ...]]:
     """Scores of the laws in the residuals of p, and beside those that were surest before.
 
     Parameters
     ----------
     bread : (X^T X)^-1, the noise of the encoders taken off
+    terms : as `terms_of`
     """
     e = white.residuals(p)
-    terms, columns = [(law, joint) for law in LAWS for joint in range(len(e))], white.others.reshape(-1, *e.shape[1:])
+    columns = np.array([white.others[list(LAWS).index(law), joint] for law, joint in terms])
     mixed = np.array([bread @ np.einsum("wpk,wk->p", white.regressors[joint], column)
                       for (_, joint), column in zip(terms, columns, strict=True)])  # fmt: skip
     rests = -np.einsum("iwpk,tp->tiwk", white.regressors, mixed, optimize=True)
@@ -507,6 +550,25 @@ def _lacking(white: RobotRows, p: Float, bread: Float) -> Iterator[tuple[Lacking
         yield tuple(
             Lacking(*terms[k], float(size), t, -size * mixed[k]) for k, size, t in zip(chosen, sizes, sure, strict=True)
         )
+
+
+def _idle_parts(whole: RobotRun, rows: RobotRows, grams: Float) -> Float:
+    """Covariance of the rows of joints that nothing drives [idle, 3], from the noise of the encoders alone, with the
+    parameters of the file: their residuals are least where all parameters are 0."""
+    chain = whole.chain
+    given = [chain.of_file(one) for one in chain.base]
+    friction_only = {"Fv", "Fc", "Offset"}
+    unknown = [chain.name_of(base) for base, one in zip(chain.base, given, strict=True)
+               if one is None and chain.standard[base.standard].kind not in friction_only]  # fmt: skip
+    if unknown:
+        raise PvidError(
+            f"where nothing drives {chain.force(whole.idle[0]).removeprefix('the ')} values are needed to begin with, "
+            f"for {', '.join(unknown)}: give every joint its inertial"
+        )
+    again = RobotRows.of(whole, tuple(one.standard for one in chain.base), 0)
+    noise = np.einsum("iwpk,p->iwk", (again.regressors - rows.regressors)[whole.idle], [one or 0.0 for one in given])
+    root = np.eye(rows.known.shape[2])
+    return np.array([_fitted(one.T @ one / rows.windows, grams, root) for one in noise])
 
 
 def _root(parts: Float, grams: Float) -> Float:
