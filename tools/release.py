@@ -1,4 +1,7 @@
-"""What tools/release runs: the parts of a release, each built from what is committed and tested in a clean folder."""
+"""What tools/release runs: the parts of a release, each built from what is committed and used from a clean folder.
+
+With --check it uses the parts of a folder alone, by the wheel that is installed here: what a bare machine runs.
+"""
 
 import argparse
 import email
@@ -14,6 +17,7 @@ import zipfile
 from collections.abc import Iterable, Sequence
 from importlib import metadata
 from pathlib import Path
+from urllib.parse import unquote
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -21,12 +25,13 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[1]
 OUT = ROOT / "build" / "release"
 MECHANISM = "dc_motor"
-PACKAGES = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx")
-CORES = ("f32", "q31")
+PACKAGES = ("cmake", "arduino", "platformio", "esp-idf", "zephyr", "cubemx")
+WANTED = (*((one, "f32") for one in PACKAGES), ("amalgamation", "f32"), ("amalgamation", "q31"))
+HEADER = "firmware/include/pvid/version.h"
 G = 9.5  # [m/s^2] of the rig that `pvid simulate` takes
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest of a zip: the same files make the same archive on every day
 _EPOCH = "315532800"  # the same, of a wheel
-_C99 = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-maybe-uninitialized", "-O1", "-I.", "-c")
+_C99 = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-maybe-uninitialized", "-O1")
 # What host/pyproject.toml says of folders above its own, which a source distribution does not have.
 _UPWARD = {
     'cmake.source-dir = ".."': 'cmake.source-dir = "."',
@@ -42,7 +47,7 @@ class RefusalError(Exception):
 
 def version_of_header(root: Path) -> str:
     """The version's home, which CMake reads as well."""
-    text = (root / "firmware" / "include" / "pvid" / "version.h").read_text(encoding="utf-8")
+    text = (root / HEADER).read_text(encoding="utf-8")
     return ".".join(re.findall(r"#define PVID_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", text))
 
 
@@ -68,7 +73,7 @@ def check_versions(root: Path) -> None:
         ("host/docs/changelog.md", version_of_changelog(root)),
     ):
         if other != version:
-            raise RefusalError(f"{path} has {other} at its top and firmware/include/pvid/version.h has {version}.")
+            raise RefusalError(f"{path} has {other} at its top and {HEADER} has {version}.")
 
 
 def check_changes(root: Path) -> None:
@@ -78,6 +83,25 @@ def check_changes(root: Path) -> None:
         raise RefusalError(
             f".github/changes/{left[0]} is in no section of the changelog; of such files there are {len(left)}."
         )
+
+
+def tag_of(root: Path) -> str:
+    return f"v{version_of_header(root)}"
+
+
+def check_tag(root: Path) -> None:
+    """Refuses a version that is the tag of another commit."""
+    found = run("git", "tag", "--list", tag_of(root), "--points-at", "HEAD", cwd=root, failure="git lists no tags")
+    if not found and run("git", "tag", "--list", tag_of(root), cwd=root, failure="git lists no tags"):
+        raise RefusalError(f"{tag_of(root)} is the tag of another commit: set the next version in {HEADER}.")
+
+
+def put_tag(root: Path) -> None:
+    """Annotated, in this clone alone; nothing if HEAD has it."""
+    tag = tag_of(root)
+    if not run("git", "tag", "--list", tag, cwd=root, failure="git lists no tags"):
+        message = f"pvid {version_of_header(root)}"
+        run("git", "tag", "--annotate", tag, "--message", message, cwd=root, failure=f"git cannot make the tag {tag}")
 
 
 def check_tree(root: Path) -> None:
@@ -209,12 +233,13 @@ def bare_environment(wheel: Path, folder: Path) -> Path:
     return folder / "bin" / "python"
 
 
-def pvid(python: Path, *arguments: str | Path, cwd: Path, failure: str) -> str:
+def pvid(python: str | Path, *arguments: str | Path, cwd: Path, failure: str) -> str:
     return run(python, "-P", "-m", "pvid", *arguments, cwd=cwd, failure=failure)
 
 
-def check_wheel(python: Path, version: str, folder: Path) -> None:
+def check_wheel(python: str | Path, version: str, folder: Path) -> None:
     """Refuses a wheel that does not identify a run by its own core."""
+    folder.mkdir()
     failure = "the installed wheel fails"
     said = pvid(python, "--version", cwd=folder, failure=failure)
     if version not in said:
@@ -244,33 +269,57 @@ def zipped(folder: Path, archive: Path) -> Path:
     return archive
 
 
+def archive_of(target: str, core: str, version: str, out: Path) -> Path:
+    return out / f"pvid-{version}-{MECHANISM}-{target}-{core}.zip"
+
+
 def package(python: Path, target: str, core: str, version: str, out: Path, folder: Path) -> Path:
     """The mechanism's deployment for one ecosystem, as the installed wheel writes it."""
     place = folder / f"{target}-{core}"
     options = ("--for", target, "--core", core, "-o", place)
     pvid(python, "deploy", MECHANISM, *options, cwd=folder, failure=f"pvid deploy --for {target} --core {core} fails")
-    return zipped(place, out / f"pvid-{version}-{MECHANISM}-{target}-{core}.zip")
+    return zipped(place, archive_of(target, core, version, out))
 
 
-def check_package(archive: Path, folder: Path) -> None:
-    """Refuses a package whose C does not compile as C99; that for CMake must print what its README promises."""
+def check_pages(archive: Path) -> None:
+    """Refuses pages with a link to a file that is not among them."""
+    with zipfile.ZipFile(archive) as made:
+        names = set(made.namelist())
+        pages = [name for name in names if name.endswith(".html")]
+        for page in sorted(pages):
+            for link in re.findall(r'(?:href|src)="([^"#?:]+)["#?]', made.read(page).decode()):
+                to = os.path.normpath(f"{os.path.dirname(page)}/{unquote(link)}")
+                if to not in names and f"{to}/index.html" not in names:
+                    raise RefusalError(f"{page} of {archive.name} has a link to {link}, which is not there.")
+    if f"{archive.stem}/index.html" not in pages or f"{archive.stem}/api/index.html" not in pages:
+        raise RefusalError(f"{archive.name} lacks the page index.html or that of the C headers.")
+
+
+def check_package(archive: Path, main: str, folder: Path) -> None:
+    """Refuses a package whose C does not compile as C99, or whose example prints other digits than its README.
+
+    Boards have no `main`, which runs the example on this computer.
+    """
+    folder.mkdir()
     with zipfile.ZipFile(archive) as made:
         made.extractall(folder)
     (top,) = folder.iterdir()
-    if (top / "src").is_dir():
-        sources, includes = [*(top / "src").rglob("*.c")], [f"-I{top / 'src'}"]
-    else:  # two files to copy
-        sources, includes = [*top.glob("*.c"), *top.glob("example/*_example.c")], ["-Iexample"]
-    if not sources:
-        raise RefusalError(f"{archive.name} contains no C.")
-    run(*_C99, *includes, *sources, cwd=top, failure=f"{archive.name} does not compile as C99")
-    if "-cmake-" in archive.name:
+    (folder / "main.c").write_text(main, encoding="utf-8")
+    examples = list(top.rglob(f"{MECHANISM}_example.c"))
+    sources = [folder / "main.c", *examples, *top.glob("*.c"), *(top / "src").rglob("*.c")]
+    includes = [f"-I{one}" for one in (top, top / "src", *(one.parent for one in examples))]
+    failure = f"{archive.name} does not compile as C99"
+    run(*_C99, *includes, *sources, "-lm", "-o", folder / "example", cwd=top, failure=failure)
+    programs = [folder / "example"]
+    if (top / "CMakeLists.txt").is_file() and "-cmake-" in archive.name:
         failure = f"{archive.name} does not build"
-        run("cmake", "-S", top, "-B", top / "build", cwd=top, failure=failure)
-        run("cmake", "--build", top / "build", cwd=top, failure=failure)
-        told = run(top / "build" / f"{MECHANISM}_example", cwd=top, failure=f"the example of {archive.name} fails")
-        readme = (top / "README.md").read_text(encoding="utf-8")
-        if not told.strip() or any(line.strip() not in readme for line in told.splitlines()):
+        run("cmake", "-S", top, "-B", folder / "build", "-G", "Ninja", cwd=top, failure=failure)
+        run("cmake", "--build", folder / "build", cwd=top, failure=failure)
+        programs.append(folder / "build" / f"{MECHANISM}_example")
+    promised = re.findall(r"(?m)^    (\S.* = .* \+- .*)$", (top / "README.md").read_text(encoding="utf-8"))
+    for program in programs:
+        told = run(program, cwd=top, failure=f"the example of {archive.name} fails").splitlines()
+        if not promised or told != promised:
             raise RefusalError(f"the example of {archive.name} prints other digits than its README.")
 
 
@@ -280,36 +329,49 @@ def checksums(paths: Iterable[Path]) -> str:
     return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in ordered)
 
 
-def build(version: str, out: Path) -> list[Path]:
-    """Builds and tests every part; returns the files."""
+def build(version: str, out: Path, clean: Path) -> Path:
+    """Builds every part; returns the Python of a bare environment that has the wheel."""
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
-    with tempfile.TemporaryDirectory(prefix="pvid-release-") as name:
-        clean = Path(name)
-        for one in ("archive", "sdist", "again", "twice", "run", "deploy"):
-            (clean / one).mkdir()
-        say("source archive")
-        archive = source_archive(ROOT, version, out)
-        source = extracted(archive, clean / "archive")
-        check_sources(source, clean / "cmake")
-        say("wheel")
-        wheel = wheel_of(source / "host", out, "the source archive")
-        check_again(source, wheel, clean / "twice")
-        python = bare_environment(wheel, clean / "venv")
-        check_wheel(python, version, clean / "run")
-        say("bill of materials, documentation")
-        packages = [bill_of_materials(wheel, version, out)]
-        run(sys.executable, "-P", "tools/docs.py", cwd=source, failure="the documentation cannot be built")
-        packages.append(zipped(source / "build" / "site", out / f"pvid-{version}-docs.zip"))
-        say("sdist")
-        sdist = sdist_of(source, out, clean / "sdist")
-        check_sdist(sdist, wheel, clean / "again")
-        wanted = [*((one, "f32") for one in PACKAGES), *(("amalgamation", core) for core in CORES)]
-        for target, core in wanted:
-            say(f"{MECHANISM} for {target}, {core}")
-            packages.append(package(python, target, core, version, out, clean / "deploy"))
-            check_package(packages[-1], clean / f"check-{target}-{core}")
-    return [archive, wheel, sdist, *packages]
+    for one in ("archive", "sdist", "again", "twice", "deploy"):
+        (clean / one).mkdir()
+    say("source archive, wheel")
+    source = extracted(source_archive(ROOT, version, out), clean / "archive")
+    wheel = wheel_of(source / "host", out, "the source archive")
+    check_again(source, wheel, clean / "twice")
+    python = bare_environment(wheel, clean / "venv")
+    say("bill of materials, documentation")
+    bill_of_materials(wheel, version, out)
+    run(sys.executable, "-P", "tools/docs.py", cwd=source, failure="the documentation cannot be built")
+    zipped(source / "build" / "site", out / f"pvid-{version}-docs.zip")
+    say("sdist")
+    check_sdist(sdist_of(source, out, clean / "sdist"), wheel, clean / "again")
+    for target, core in WANTED:
+        say(f"{MECHANISM} for {target}, {core}")
+        package(python, target, core, version, out, clean / "deploy")
+    sums = checksums(out.iterdir())
+    (out / "SHA256SUMS").write_text(sums, encoding="utf-8")
+    return python
+
+
+def check(out: Path, python: str | Path, clean: Path) -> None:
+    """Uses every part, from its file alone."""
+    run("sha256sum", "--check", "--strict", "SHA256SUMS", cwd=out, failure="the checksums are wrong")
+    (source,) = out.glob("pvid-*-source.tar.gz")
+    version = source.name.split("-")[1]
+    say("uses the source archive")
+    (clean / "sources").mkdir()
+    check_sources(extracted(source, clean / "sources"), clean / "cmake")
+    say("uses the wheel")
+    check_wheel(python, version, clean / "run")
+    check_pages(out / f"pvid-{version}-docs.zip")
+    main = ""
+    for target, core in WANTED:
+        say(f"uses {MECHANISM} for {target}, {core}")
+        archive = archive_of(target, core, version, out)
+        if target in ("cmake", "amalgamation"):
+            main = zipfile.ZipFile(archive).read(f"{archive.stem}/example/main.c").decode()
+        check_package(archive, main, clean / f"{target}-{core}")
 
 
 def say(text: str) -> None:
@@ -319,22 +381,28 @@ def say(text: str) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="tools/release", description=__doc__)
     parser.add_argument("--rehearse", action="store_true", help="report what forbids a release, and build all the same")
-    rehearse = parser.parse_args(arguments).rehearse
+    parser.add_argument("--check", metavar="FOLDER", type=Path, help="use the parts in a folder, by the pvid installed")
+    asked = parser.parse_args(arguments)
     os.environ["SOURCE_DATE_EPOCH"] = _EPOCH
-    try:
-        for check in (check_tree, check_versions, check_changes):
-            try:
-                check(ROOT)
-            except RefusalError as refusal:
-                if not rehearse:
-                    raise
-                say(f"a release is refused: {refusal}")
-        sums = checksums(build(version_of_header(ROOT), OUT))
-        (OUT / "SHA256SUMS").write_text(sums, encoding="utf-8")
-    except RefusalError as refusal:
-        say(str(refusal))
-        return 1
-    print(sums, end="")
+    with tempfile.TemporaryDirectory(prefix="pvid-release-") as name:
+        try:
+            if asked.check:
+                check(asked.check.resolve(), sys.executable, Path(name))
+                return 0
+            for condition in (check_tree, check_versions, check_changes, check_tag):
+                try:
+                    condition(ROOT)
+                except RefusalError as refusal:
+                    if not asked.rehearse:
+                        raise
+                    say(f"a release is refused: {refusal}")
+            check(OUT, build(version_of_header(ROOT), OUT, Path(name)), Path(name))
+            if not asked.rehearse:
+                put_tag(ROOT)
+        except RefusalError as refusal:
+            say(str(refusal))
+            return 1
+    print((OUT / "SHA256SUMS").read_text(encoding="utf-8"), end="")
     return 0
 
 

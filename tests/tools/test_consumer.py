@@ -80,9 +80,10 @@ def version() -> str:
 
 
 @pytest.fixture(scope="module")
-def by_package(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+def by_package(prefix: Path, version: str, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     build = tmp_path_factory.mktemp("find_package")
-    return built(build, "-DPVID_BY=find_package", f"-DCMAKE_PREFIX_PATH={prefix}")
+    wanted = f"-DPVID_VERSION_WANTED={version.rpartition('.')[0]}"
+    return built(build, "-DPVID_BY=find_package", f"-DCMAKE_PREFIX_PATH={prefix}", wanted)
 
 
 def test_the_python_package_has_the_same_version(version: str) -> None:

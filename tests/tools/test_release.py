@@ -139,20 +139,59 @@ def test_the_bill_of_materials_has_what_the_wheel_contains_and_what_its_requirem
     assert told["components"][0]["purl"] == "pkg:npm/uplot@1.6.32"
 
 
+MAIN = 'int it(void);\n#include <stdio.h>\nint main(void) { printf("R = %d +- 1 ohm\\n", it()); return 0; }\n'
+
+
 @pytest.mark.parametrize(
-    ("code", "refused"), [("int it(void) { return 1; }\n", False), ("int it(void) { return x; }\n", True)]
+    ("code", "readme", "refusal"),
+    [
+        ("int it(void) { return 1; }\n", "    R = 1 +- 1 ohm\n", None),
+        ("int it(void) { return x; }\n", "    R = 1 +- 1 ohm\n", r"it\.zip does not compile as C99: .*x"),
+        ("int it(void) { return 2; }\n", "    R = 1 +- 1 ohm\n", "other digits than its README"),
+        ("int it(void) { return 1; }\n", "It prints R.\n", "other digits than its README"),
+        ("int it(void) { return 1; }\n", "    R = 1 +- 1 ohm\n    L = 1 +- 1 H\n", "other digits than its README"),
+    ],
 )
-def test_a_package_whose_c_does_not_compile_is_refused(code: str, refused: bool, tmp_path: Path) -> None:
+def test_a_package_is_refused_that_does_not_print_what_its_readme_promises(
+    code: str, readme: str, refusal: str | None, tmp_path: Path
+) -> None:
     (tmp_path / "p" / "src").mkdir(parents=True)
     (tmp_path / "p" / "src" / "it.c").write_text(code, encoding="utf-8")
+    (tmp_path / "p" / "README.md").write_text(readme, encoding="utf-8")
     archive = release.zipped(tmp_path / "p", tmp_path / "it.zip")
-    (tmp_path / "clean").mkdir()
-    if not refused:
-        release.check_package(archive, tmp_path / "clean")
+    if refusal is None:
+        release.check_package(archive, MAIN, tmp_path / "clean")
         return
-    with pytest.raises(release.RefusalError, match=r"it\.zip does not compile as C99: .*x") as sentence:
-        release.check_package(archive, tmp_path / "clean")
+    with pytest.raises(release.RefusalError, match=refusal) as sentence:
+        release.check_package(archive, MAIN, tmp_path / "clean")
     assert "\n" not in str(sentence.value)
+
+
+@pytest.mark.parametrize(("link", "refused"), [("api/index.html#a", False), ("api/none.html", True)])
+def test_pages_with_a_link_to_nothing_are_refused(link: str, refused: bool, tmp_path: Path) -> None:
+    (tmp_path / "site" / "api").mkdir(parents=True)
+    (tmp_path / "site" / "index.html").write_text(f'<a href="{link}">', encoding="utf-8")
+    (tmp_path / "site" / "api" / "index.html").write_text('<a href="../index.html"><a href="#a">', encoding="utf-8")
+    archive = release.zipped(tmp_path / "site", tmp_path / "docs.zip")
+    if not refused:
+        release.check_pages(archive)
+        return
+    with pytest.raises(release.RefusalError, match=r"api/none\.html"):
+        release.check_pages(archive)
+
+
+def test_a_release_tags_its_commit_once_and_no_other(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for role in ("AUTHOR", "COMMITTER"):
+        monkeypatch.setenv(f"GIT_{role}_NAME", "a")
+        monkeypatch.setenv(f"GIT_{role}_EMAIL", "a@b")
+    for _ in range(2):
+        release.check_tag(project)
+        release.put_tag(project)
+    assert git("cat-file", "-t", "v1.2.3", cwd=project) == "tag\n"
+    assert git("rev-parse", "v1.2.3^{}", cwd=project) == git("rev-parse", "HEAD", cwd=project)
+    git("commit", "-qm", "more", "--allow-empty", cwd=project)
+    with pytest.raises(release.RefusalError, match=r"v1\.2\.3 is the tag of another commit"):
+        release.check_tag(project)
 
 
 def test_the_program_ends_with_one_sentence(
@@ -162,7 +201,7 @@ def test_the_program_ends_with_one_sentence(
         raise release.RefusalError("a.c is not committed as it is; of such files there are 1.")
 
     monkeypatch.setattr(release, "check_tree", refuse)
-    monkeypatch.setattr(release, "build", lambda version, out: pytest.fail("it went on"))
+    monkeypatch.setattr(release, "build", lambda *_: pytest.fail("it went on"))
     assert release.main([]) == 1
     said = capsys.readouterr()
     assert said.err == "release: a.c is not committed as it is; of such files there are 1.\n" and not said.out
