@@ -3,7 +3,7 @@
 #define PVID_VERSION_H
 
 #define PVID_VERSION_MAJOR 0
-#define PVID_VERSION_MINOR 2
+#define PVID_VERSION_MINOR 3
 #define PVID_VERSION_PATCH 0
 
 #endif
