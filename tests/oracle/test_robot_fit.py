@@ -238,6 +238,19 @@ def test_a_slow_clock_is_refused() -> None:
         identify_robot(model_of(SPATIAL), robot_arms.log_of(SPATIAL, 0), 50.0)
 
 
+def test_a_joint_at_a_constant_rate_has_no_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
+    def steady(*given: Any) -> Any:
+        t, q, v, a = sines(*given)
+        q[0], v[0], a[0] = 0.7 * t, 0.7, 0.0
+        return t, q, v, a
+
+    sines = robot_arms.motion
+    monkeypatch.setattr(robot_arms, "motion", steady)
+    found = identify_robot(model_of(SPATIAL), robot_arms.log_of(SPATIAL, 0), RATE)
+    lost = [name for name, one in zip(found.run.model.p_names, found.undetermined, strict=True) if one]
+    assert lost == ["Izz1_R", "Fv1", "Fc1"]  # of a rate that does not change, friction is viscous as well as dry
+
+
 def test_what_a_fit_does_not_determine_has_no_value(monkeypatch: pytest.MonkeyPatch) -> None:
     log = robot_arms.log_of(SPATIAL, 0)
     fit, recording = fits(1)[0], Recording(log.pop("t"), log, RATE)

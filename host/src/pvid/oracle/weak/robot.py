@@ -385,7 +385,8 @@ class RobotFit:
     uncorrected : p with the noise of the encoders in the regressors [p]
     halves : of the first and of the second half of the windows [2, p]
     apart : their difference over its standard error [p]
-    undetermined : a standard error is worth more than a tenth of the torques [p]
+    undetermined : a standard error is worth more than a tenth of the torques, or its column has more noise than motion
+        [p]
     windows : of the run
     lacking : terms that the equations may lack, one, two, .. together: each time the surest is added, as the last one
     """
@@ -490,6 +491,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     size = np.sqrt(np.diag(covariance) * np.diag(s))
     balanced = np.sum(white.regressors[idle] ** 2, axis=(0, 1, 3)) * p**2  # what cancels where no torque is
     undetermined = ~(size < _COVERED * np.sqrt(np.sum(white.known**2) + np.sum(balanced)))
+    undetermined |= np.diag(corrected) < np.diag(more_s)  # more noise than motion
     middle = rows.windows // 2
     halves, variances = [], []
     for part in (slice(0, middle), slice(middle, None)):
