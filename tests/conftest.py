@@ -41,7 +41,7 @@ SLOW = """
     identification/several_recordings fleet/batch board/refined_stream codegen/generated_q31 bench/mechanisms
     cli/readme log/verify log/witness oracle/weak_in_c board/weak_boards core/weak_rows_q31 core/arithmetic_options
     codegen/weak_c core/recorded_hashes oracle/feedback codegen/generated_f32 oracle/weak_identify
-    bench/accidents core/sizes_agree twin/state tools/notebooks oracle/corners model/elimination
+    core/sizes_agree twin/state tools/notebooks oracle/corners model/elimination
     core/kinds_q31 tools/core_rooms oracle/weak_choice tools/consumer codegen/strong_model_q31 link/link
     twin/runs_begin oracle/scale identification/refined_length core/refinement codegen/refine
     core/dropped_calls sim/rigs core/bad_config bench/longevity core/model_library core/equation_error tools/docs

@@ -206,22 +206,3 @@ def test_adding_to_b_moves_the_solution_by_the_inverse_of_the_information(native
     expected = np.linalg.solve(c.T @ m @ c, c.T @ g)
     # second order of the ties, and float32
     assert np.allclose(moved.p.astype(np.float64) - plain.p, expected, rtol=0.02, atol=3e-7)
-
-
-def test_what_cannot_be_added_changes_nothing(native: Native) -> None:
-    random = np.random.default_rng(4)
-    model = BlockModel.random(random, (4, 9), 4)
-    core = estimator(native, model, config_of(model))
-    fine = np.ones(5, np.float32)
-    core.add(1, fine, 1.0)
-    before = core.levels
-    large = np.full(9, 2e28, np.float32)
-    bad = fine.copy()
-    bad[4] = np.nan
-    assert core.add(1, bad, 1.0) == Reason.REJECTED_NOT_FINITE
-    assert core.add(0, fine[:4], np.inf) == Reason.REJECTED_NOT_FINITE
-    assert core.add(0, np.full(4, 1e14, np.float32), 0.0) == Reason.REJECTED_SATURATED
-    assert core.add_to_b(np.full(9, np.nan, np.float32)) == Reason.REJECTED_NOT_FINITE
-    assert core.add_to_b(-large) == Reason.REJECTED_SATURATED
-    assert core.add(2, fine, 1.0) == Reason.NOT_READY  # there are kinds 0 and 1
-    assert np.array_equal(core.levels, before)

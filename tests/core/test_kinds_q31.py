@@ -33,26 +33,6 @@ def test_every_block_keeps_within_its_limit(native: Native, loud: int) -> None:
     assert exponents[0] == exponents[-1] == 0
 
 
-def test_what_cannot_be_added_changes_nothing(native: Native) -> None:
-    random = np.random.default_rng(4)
-    model = BlockModelQ31.random(random, (4, 9), 4)
-    core = estimator(native, model, config_of(model, gain=ONE // 2))
-    fine = np.ones(5, np.int64)
-    core.add(1, fine, 1)
-    before = core.sums
-    large = fine.copy()
-    large[4] = 2**28 + 1
-    assert core.add(1, large, 1) == Reason.REJECTED_SATURATED
-    assert core.add(0, fine[:4], -(2**28) - 1) == Reason.REJECTED_SATURATED
-    assert core.add(2, fine, 1) == Reason.NOT_READY  # there are kinds 0 and 1
-    g = np.zeros(9, np.int64)
-    g[7] = ONE
-    assert core.add_to_b(g, np.full(9, 40)) == Reason.REJECTED_SATURATED
-    assert np.array_equal(core.sums, before)
-    assert core.add_to_b(g, np.full(9, 30)) == Reason.ACCUMULATED
-    assert core.sums[10 + 15 + 7] == before[10 + 15 + 7] + 2**60
-
-
 ROOMY = {"PVID_MAX_P": 8, "PVID_MAX_THETA_Q31": 31, "PVID_MAX_MOMENTS_Q31": 496, "PVID_MAX_C_Q31": 62}
 
 

@@ -4,12 +4,14 @@ import json
 import re
 import shlex
 from collections.abc import Callable, Mapping
+from math import tanh
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from in_process import pvid
+from runge_kutta import States, motion
 
 from pvid.base.console import DONE
 from pvid.base.errors import PvidError
@@ -17,23 +19,6 @@ from pvid.model import Model
 from pvid.models.mechanisms import compiled_of, described
 
 Float = npt.NDArray[np.float64]
-
-SUB = 10  # steps a sample
-
-
-def simulated(rate: float, u: Float, start: list[float], slope: Callable[[Float, float], list[float]]) -> Float:
-    """States at the samples [n, states], by RK4; the input [n] is held."""
-    x, h = np.array(start, np.float64), 1 / rate / SUB
-    out = np.empty((len(u), len(x)))
-    for place, held in enumerate(u):
-        out[place] = x
-        for _ in range(SUB):
-            a = np.array(slope(x, held))
-            b = np.array(slope(x + h / 2 * a, held))
-            c = np.array(slope(x + h / 2 * b, held))
-            d = np.array(slope(x + h * c, held))
-            x = x + h / 6 * (a + 2 * b + 2 * c + d)
-    return out
 
 
 def written(path: Path, rate: float, signals: Mapping[str, Float]) -> Path:
@@ -50,12 +35,12 @@ def motor_with_brushes(folder: Path) -> tuple[Path, str | Path, dict[str, float]
     truth = {"R": 1.2, "L": 3e-3, "k": 0.05, "J": 2e-4, "b": 1e-4, "Tc": 0.012}
     R, L, k, J, b, Tc = truth.values()
 
-    def slope(x: Float, V: float) -> list[float]:
+    def slope(x: States, V: float) -> States:
         i, _, w = x
-        sign = np.tanh(w / 0.05)
-        return [(V - R * i - k * w - 0.4 * np.tanh(i / 0.01)) / L, w, (k * i - b * w - Tc * sign) / J]
+        sign = tanh(w / 0.05)
+        return (V - R * i - k * w - 0.4 * tanh(i / 0.01)) / L, w, (k * i - b * w - Tc * sign) / J
 
-    x = simulated(rate, V, [0.0, 0.0, 0.0], slope)
+    x = motion(slope, (0.0, 0.0, 0.0), V, 1 / rate, 10)
     i, phi = x[:, 0], x[:, 1]
     i = np.round((i + random.normal(0, 1e-3, n)) / (10 / 2**12)) * (10 / 2**12)
     phi = np.round(phi / (2 * np.pi / 2**12)) * (2 * np.pi / 2**12)
@@ -74,7 +59,11 @@ m.equation(x.d(2) + d * x.d() + w2 * x, "balance")
 def free_body_with_drag(folder: Path) -> tuple[Path, str | Path, dict[str, float]]:
     """A mechanism without an input, in a model file of one's own; its drag is also quadratic."""
     rate, n = 200.0, 4000
-    x = simulated(rate, np.zeros(n), [0.5, 0.0], lambda x, _: [x[1], -0.05 * x[1] - 0.6 * abs(x[1]) * x[1] - 30 * x[0]])
+
+    def slope(x: States, _: float) -> States:
+        return x[1], -0.05 * x[1] - 0.6 * abs(x[1]) * x[1] - 30 * x[0]
+
+    x = motion(slope, (0.5, 0.0), np.zeros(n), 1 / rate, 10)
     x = np.round(x[:, 0] / 1e-6) * 1e-6
     (folder / "free.py").write_text(FREE, encoding="utf-8")
     return written(folder / "free.csv", rate, {"x": x}), folder / "free.py", {"d": 0.05, "w2": 30.0}
@@ -97,7 +86,7 @@ def cell_with_another_current(folder: Path) -> tuple[Path, str | Path, dict[str,
     random, rate, n = np.random.default_rng(3), 100.0, 4000
     i = random.uniform(-2, 2, n // 50).repeat(50)
     true = i + 0.1 * np.sign(i)
-    y = simulated(rate, true, [0.0], lambda x, i: [(0.6 * i - x[0]) / 0.8])[:, 0]
+    y = motion(lambda x, i: ((0.6 * i - x[0]) / 0.8,), (0.0,), true, 1 / rate, 10)[:, 0]
     v = y + 0.5 * true + random.normal(0, 1e-5, n)
     (folder / "cell.py").write_text(CELL, encoding="utf-8")
     return written(folder / "cell.csv", rate, {"i": i, "v": v}), folder / "cell.py", {"R0": 0.5, "R1": 0.6, "T1": 0.8}

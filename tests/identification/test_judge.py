@@ -1,12 +1,14 @@
 """What an answer predicts: another run, and motion of its own that it was not fitted to."""
 
 import json
+from math import tanh
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
+from runge_kutta import States, motion
 from scipy.signal import cont2discrete, dlsim, lfilter
 
 import pvid
@@ -70,19 +72,13 @@ def test_poor_prediction_of_an_explained_run_is_a_doubt_where_it_is_more_than_no
 
 def test_a_term_that_no_prediction_misses_is_told_and_one_that_is_missed_is_not() -> None:
     def told(friction: float) -> str:
-        t, h, z, x = np.arange(6000) / 500, 1 / 2000, np.zeros(2), np.zeros(6000)
+        t = np.arange(6000) / 500
         force = 4 * np.sin(2 * np.pi * 0.7 * t) + 3 * np.sin(2 * np.pi * 1.9 * t)
 
-        def slope(z: Float, f: float) -> Float:
-            return np.array([z[1], (f - 1.7 * z[1] - 82 * z[0] - friction * np.tanh(z[1] / 1e-3)) / 1.3])
+        def slope(z: States, f: float) -> States:
+            return z[1], (f - 1.7 * z[1] - 82 * z[0] - friction * tanh(z[1] / 1e-3)) / 1.3
 
-        for n, f in enumerate(force):
-            x[n] = z[0]
-            for _ in range(4):
-                a = slope(z, f)
-                b = slope(z + h / 2 * a, f)
-                d = slope(z + h / 2 * b, f)
-                z = z + h / 6 * (a + 2 * b + 2 * d + slope(z + h * d, f))
+        x = motion(slope, (0.0, 0.0), force, 1 / 500, 4)[:, 0]
         x += np.random.default_rng(1).normal(0, 3e-5, 6000)
         model = Model("cart")
         given = model.input("F", "N", hold="zoh", reach=12, gain_sd=0)

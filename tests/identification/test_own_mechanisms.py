@@ -1,11 +1,13 @@
-"""Mechanisms of a user, simulated in closed form or by Runge-Kutta of this file: what only they showed."""
+"""Mechanisms of a user, simulated in closed form or by tests/runge_kutta.py: what only they showed."""
 
 import re
-from collections.abc import Callable
+from functools import cache
+from math import tanh
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from runge_kutta import States, motion
 
 from pvid.configuration.weak_q31 import weak_q31_to_identify
 from pvid.identification.advice import advice_on
@@ -34,21 +36,6 @@ def held_at_random(n: int, low: int, high: int, reach: float, seed: int) -> Floa
     random = np.random.default_rng(seed)
     lengths = random.integers(low, high, n // low + 1)
     return np.repeat(random.uniform(-reach, reach, len(lengths)), lengths)[:n]
-
-
-def motion(rate: Callable[[Float, float], Float], start: Float, u: Float, dt: float, parts: int = 8) -> Float:
-    """Runge-Kutta of order 4 of x' = rate(x, u), u held [samples, states]."""
-    x, h = np.empty((len(u), len(start))), dt / parts
-    x[0] = now = start
-    for k, value in enumerate(u[:-1]):
-        for _ in range(parts):
-            a = rate(now, value)
-            b = rate(now + h / 2 * a, value)
-            c = rate(now + h / 2 * b, value)
-            d = rate(now + h * c, value)
-            now = now + h / 6 * (a + 2 * b + 2 * c + d)
-        x[k + 1] = now
-    return x
 
 
 def recorded(dt: float, **signals: Float) -> Recording:
@@ -119,10 +106,10 @@ def drag_answer() -> Analysis:
     dt = 1 / 500
     u = held_at_random(12_000, 60, 500, 0.9, 3)
 
-    def rate(x: Float, torque: float) -> Float:
-        return np.array([x[1], (torque - DRAG["D"] * abs(x[1]) * x[1] - DRAG["G"] * x[0]) / DRAG["J"]])
+    def rate(x: States, torque: float) -> States:
+        return x[1], (torque - DRAG["D"] * abs(x[1]) * x[1] - DRAG["G"] * x[0]) / DRAG["J"]
 
-    a = motion(rate, np.zeros(2), u, dt, 4)[:, 0]
+    a = motion(rate, (0.0, 0.0), u, dt, 4)[:, 0]
     return analysed(recorded(dt, u=u, a=read(a, 2 * np.pi / 2**12, 4)), drag_model())
 
 
@@ -147,10 +134,10 @@ def test_a_drive_of_steps_is_refined_in_c() -> None:
     truth, dt = {"R": 4.0, "L": 0.08, "C": 1.4e-3}, 5e-4
     voltage = held_at_random(8000, 10, 200, 5.0, 5)
 
-    def rate(x: Float, now: float) -> Float:
-        return np.array([(now - truth["R"] * x[0] - x[1]) / truth["L"], x[0] / truth["C"]])
+    def rate(x: States, now: float) -> States:
+        return (now - truth["R"] * x[0] - x[1]) / truth["L"], x[0] / truth["C"]
 
-    x = motion(rate, np.zeros(2), voltage, dt, 2)
+    x = motion(rate, (0.0, 0.0), voltage, dt, 2)
     recording = recorded(dt, V=voltage, i=read(x[:, 0], 1 / 2**12, 6), v=read(x[:, 1], 20 / 2**12, 7))
     found = refined_in_c(identify_in_c(analysed(recording, model.compiled("circuit")), "f32"))
     assert found.adopted and found.level is not None and found.level < 1.3
@@ -191,15 +178,16 @@ def test_an_input_that_is_known_exactly_costs_fixed_point_no_digits() -> None:
 SPRING = {"m": 1.3, "c": 3.0, "k": 400.0}
 
 
+@cache
 def spring_run(friction: float = 0.0) -> dict[str, Float]:
     """A mass on a spring, pushed by steps, 20 s at 1 kHz."""
     force = held_at_random(20_000, 50, 500, 10.0, 11)
 
-    def rate(state: Float, now: float) -> Float:
-        brake = SPRING["c"] * state[1] + friction * np.tanh(state[1] / 2e-3)
-        return np.array([state[1], (now - brake - SPRING["k"] * state[0]) / SPRING["m"]])
+    def rate(x: States, now: float) -> States:
+        brake = SPRING["c"] * x[1] + friction * tanh(x[1] / 2e-3)
+        return x[1], (now - brake - SPRING["k"] * x[0]) / SPRING["m"]
 
-    return {"F": force, "x": read(motion(rate, np.zeros(2), force, 1e-3, 2)[:, 0], 0.1 / 2**12, 12)}
+    return {"F": force, "x": read(motion(rate, (0.0, 0.0), force, 1e-3, 2)[:, 0], 0.1 / 2**12, 12)}
 
 
 def spring_answer(signals: dict[str, Float], step: float = 1e-3) -> Analysis:

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import tanh
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 import sympy as sp
-from test_own_mechanisms import errors_over_se, held_at_random, motion, of_core, read, recorded
+from runge_kutta import States, motion
+from test_own_mechanisms import errors_over_se, held_at_random, of_core, read, recorded
 
 from pvid.base.errors import PvidError
 from pvid.codegen.build import files_of
@@ -185,11 +187,11 @@ def test_the_motor_of_every_textbook_is_refined() -> None:
     truth, dt, n = {"R": 1.2, "k": 0.05, "J": 2e-4, "Tc": 0.01}, 1e-3, 6000
     V = held_at_random(n, 40, 200, 8.0, 1)
 
-    def rate(x: Float, u: float) -> Float:
+    def rate(x: States, u: float) -> States:
         i = (u - truth["k"] * x[0]) / truth["R"]
-        return np.array([(truth["k"] * i - truth["Tc"] * np.tanh(x[0] / 0.01)) / truth["J"]])
+        return ((truth["k"] * i - truth["Tc"] * tanh(x[0] / 0.01)) / truth["J"],)
 
-    w = motion(rate, np.array([0.0]), V, dt)[:, 0]
+    w = motion(rate, (0.0,), V, dt, 8)[:, 0]
     signals = {"V": V, "i": read((V - truth["k"] * w) / truth["R"], 0.01, 2), "w": read(w, 0.1, 3)}
     found = refine_mechanism(motor_without_inductance(), signals, 1 / dt, np.array([1.19, 0.0501, 2.01e-4, 0.01]), 1.0)
     assert found.found.converged
@@ -238,12 +240,12 @@ def coasting() -> CompiledModel:
 def coasted(n: int = 4000) -> tuple[Recording, dict[str, float]]:
     truth = {"m": 92.0, "Fr": 13.5, "b": 0.9, "cw": 0.31}
 
-    def rate(x: Float, F: float) -> Float:
-        drag = truth["Fr"] * np.tanh(x / 0.01) + truth["b"] * x + truth["cw"] * x * np.abs(x)
-        return np.asarray((F - drag) / truth["m"])
+    def rate(x: States, F: float) -> States:
+        drag = truth["Fr"] * tanh(x[0] / 0.01) + truth["b"] * x[0] + truth["cw"] * x[0] * abs(x[0])
+        return ((F - drag) / truth["m"],)
 
     F = np.maximum(held_at_random(n, 100, 300, 200.0, 3), -60.0)
-    v = motion(rate, np.array([0.1]), F, 0.02, 40)[:, 0]
+    v = motion(rate, (0.1,), F, 0.02, 40)[:, 0]
     return recorded(0.02, F=F, v=read(v, 0.01, 5)), truth
 
 

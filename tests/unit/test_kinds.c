@@ -290,6 +290,7 @@ static void a_vector_is_added_to_b_or_refused(void **state)
         assert_int_equal(pvid_estimator_add_to_b_f32(&estimator, large), PVID_REJECTED_SATURATED);
         large[5] = large[3] * 1.0e38f;
         assert_int_equal(pvid_estimator_add_to_b_f32(&estimator, large), PVID_REJECTED_NOT_FINITE);
+        assert_int_equal(pvid_estimator_add_kind_f32(&estimator, N_KINDS, fits, 1.0f), PVID_NOT_READY);
         assert_memory_equal(&estimator.information, &before.information, sizeof before.information);
         assert_memory_equal(estimator.innovation, before.innovation, sizeof before.innovation);
         assert_int_equal(estimator.counters.rejected_saturated, 1);
@@ -361,7 +362,9 @@ static void a_fixed_point_vector_is_added_to_b_or_refused(void **state)
         assert_int_equal(estimator.fresh[1], -256);
         const pvid_estimator_q31 before = estimator;
         g[2].e = 34;
+        const int32_t fits[N_THETA] = {1};
         assert_int_equal(pvid_estimator_add_to_b_q31(&estimator, g), PVID_REJECTED_SATURATED);
+        assert_int_equal(pvid_estimator_add_kind_q31(&estimator, N_KINDS, fits, 1), PVID_NOT_READY);
         assert_memory_equal(&estimator.information, &before.information, sizeof before.information);
         assert_int_equal(estimator.counters.rejected_saturated, 1);
     }

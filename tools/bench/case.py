@@ -77,7 +77,6 @@ class Case:
     tables : that it writes, without the endings that options give them
     rows : in place of a report: tables, their headers' names and those of the functions of their rows, which take
         mechanisms, a number and `advance`
-    usual : mechanisms of `rows`, where none is named
     keys : cells that name a row: a command that measures some rows leaves the others of the table
     """
 
@@ -87,7 +86,6 @@ class Case:
     tables: tuple[str, ...] = ()
     options: Sequence[click.Parameter] = ()
     rows: tuple[tuple[str, str, str], ...] = ()
-    usual: tuple[str, ...] = ()
     keys: int = 0
 
     @property
@@ -102,7 +100,7 @@ class Case:
         if not self.rows:
             report: Report = getattr(found, function or "report")(**given)
             return report
-        given = {"names": chosen(given.pop("mechanism"), self.usual), **given}
+        given = {"names": chosen(given.pop("mechanism")), **given}
         return Report(
             [(name, getattr(found, of), getattr(found, rows)(*given.values())) for name, of, rows in self.rows]
         )

@@ -78,14 +78,6 @@ CASES = (
         rows=(("hard", "HEADER", "rows"),),
     ),
     Case(
-        "accidents",
-        "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them.",
-        "accidents",
-        options=_number("--seeds", 2),
-        rows=(("accidents", "HEADER", "rows"),),
-        usual=("kapitza", "rigid_body"),
-    ),
-    Case(
         "standing",
         "Whether published estimates still hold: imperfect motors, clean runs, sensors stuck or unplugged.",
         "standing",
@@ -180,6 +172,12 @@ CASES = (
 
 # Measured once: the tables stay, the code is in the history, at the commit in their heads.
 FROZEN = (
+    Frozen(
+        "accidents",
+        "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them.",
+        ("accidents",),
+        "tests/identification/test_wild_samples.py tests/cli/test_run_input.py tests/oracle/test_samples.py",
+    ),
     Frozen(
         "attack",
         "Mutated rig files, runs and command lines: how many defects they find.",

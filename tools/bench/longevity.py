@@ -14,10 +14,10 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from bench.accidents import role_of
 from bench.board_weak import FixedBoard, FloatBoard, board_of
 from bench.mechanisms import design_of, size_of, start_of
 from pvid.core.native import Publisher
+from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.enums import Core, Reason
@@ -39,7 +39,7 @@ class Disturbance:
 
     Attributes
     ----------
-    of : which signals (bench.accidents.role_of)
+    of : which signals (role_of)
     happens : a signal [n] from the true one, random numbers and its resolution
     changes : the mechanism is another one from then on, to the end
     """
@@ -48,6 +48,14 @@ class Disturbance:
     of: str = "all"
     happens: Callable[[Float, np.random.Generator, float], Float] = lambda x, *_: x
     changes: bool = False
+
+
+def role_of(model: CompiledModel, of: str) -> list[str]:
+    """Names of the signals that a disturbance is of: "sensor" (the last one that measures), "drive" (the first one that
+    the run sets), "all"."""
+    measured = [one.name for one in model.signals if one.kind == "sensor" and not one.driven]
+    driven = [one.name for one in model.signals if one.driven or one.kind == "input"]
+    return {"sensor": measured[-1:], "drive": driven[:1], "all": [*driven, *measured]}[of]
 
 
 def _dropped(x: Float, random: np.random.Generator, _: float) -> Float:

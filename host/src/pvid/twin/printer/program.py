@@ -2,7 +2,7 @@
 
     twin = printed_module([Path("gate_f32.c")], [FIRMWARE / "include", SRC], {})
 
-`text_of` prints without loading; `pvid.twin.printer.values` makes the structs of a printed module from those of cffi.
+`text_of` does not load it; `pvid.twin.printer.values` makes the structs of a printed module from those of cffi.
 """
 
 from __future__ import annotations
@@ -50,10 +50,7 @@ def text_of(
     texts : name -> text of generated files; those that end with .c are sources as well
     about : the module's docstring
     """
-    reader = Reader(folders, macros, texts)
-    for one in [*sources, *(Path(name) for name in texts or () if name.endswith(".c"))]:
-        reader.read(one)
-    return _HEAD.format(about=about) + Translator(reader.unit, [reader.renamed(one) for one in roots]).printed()
+    return _printed(sources, folders, macros, roots, texts, about)[0]
 
 
 def printed_module(
@@ -63,16 +60,32 @@ def printed_module(
     roots: Sequence[str] = (),
     texts: Mapping[str, str] | None = None,
 ) -> ModuleType:
-    """The printed module, loaded; as `text_of`. Its text stays in the cache of builds."""
-    made_from = repr((_PRINTER, sorted(macros.items()), list(roots), sorted((texts or {}).items())))
+    """The printed module, loaded; as `text_of`."""
+    return loaded(*_printed(sources, folders, macros, roots, texts, _ABOUT))
+
+
+def _printed(
+    sources: Sequence[Path],
+    folders: Sequence[Path],
+    macros: Mapping[str, str],
+    roots: Sequence[str],
+    texts: Mapping[str, str] | None,
+    about: str,
+) -> tuple[str, str]:
+    """The text of a module, and its place in the cache of builds, where it stays."""
+    made_from = repr((_PRINTER, about, sorted(macros.items()), list(roots), sorted((texts or {}).items())))
     key = _hash_of(sources, folders, made_from)
     place = cache_folder() / "twins" / f"{key[:24]}.py"
     text = kept_text(place)
     if not text:
-        text = text_of(sources, folders, macros, roots, texts)
+        reader = Reader(folders, macros, texts)
+        for one in [*sources, *(Path(name) for name in texts or () if name.endswith(".c"))]:
+            reader.read(one)
+        unit = Translator(reader.unit, [reader.renamed(one) for one in roots])
+        text = _HEAD.format(about=about) + unit.printed()
         if _hash_of(sources, folders, made_from) == key:  # nobody has edited them meanwhile
             keep_text(place, text)
-    return loaded(text, str(place))
+    return text, str(place)
 
 
 def _hash_of(sources: Iterable[Path], folders: Iterable[Path], more: str) -> str:
