@@ -118,6 +118,14 @@ def test_all_base_parameters_are_found(thrust: bool, tmp_path: Path) -> None:
     assert np.mean(np.abs(away) < 2) > 0.85 and np.max(np.abs(away)) < 4
 
 
+def test_thrust_that_is_not_recorded_is_told(tmp_path: Path) -> None:
+    modelled(tmp_path, thrust=True)
+    text = (tmp_path / "robot.py").read_text().replace('wrench=True, hold="zoh", ', "")
+    (tmp_path / "robot.py").write_text(text)
+    verdict = answered(compiled_of(tmp_path / "robot.py"), log_of(True, 1)).verdict
+    assert verdict.word == "not_explained" and "what touches the base: the ground" in verdict.reasons[-1].text
+
+
 def test_drag_of_the_air_is_told(tmp_path: Path) -> None:
     model = modelled(tmp_path, thrust=True)
     told = " ".join(one.text for one in answered(model, log_of(True, 1, drag=2.0)).verdict.reasons)

@@ -143,8 +143,9 @@ def text_of(robot: Placed, path: Path, folder: Path | None = None) -> str:
     if robot.free:
         last, name = robot.free - 1, names[robot.free - 1]
         inertial = f", inertial={_numbers(robot.inertial(last))}" if robot.knows(last) else ""
+        wrench = ", wrench=True" if len(names) == robot.free else ""
         lines += ["# wrench=True: fx, fy, fz, mx, my, mz, which act on this body from outside, are recorded",
-                  f"model.free_base({json.dumps(name)}{inertial})"]  # fmt: skip
+                  f"model.free_base({json.dumps(name)}{inertial}{wrench})"]  # fmt: skip
     for place, (joint, name) in enumerate(zip(robot.joints, names, strict=True)):
         if place < robot.free:
             continue
