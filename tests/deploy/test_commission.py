@@ -66,22 +66,22 @@ class Commissioning:
     def of(self, truth: Mapping[str, float], seed: int = 3) -> Commissioned:
         """Of the mechanism with these parameters, the guesses where none is given."""
         rng, model, motion = np.random.default_rng(seed), self.model, self._plant.motion
-        places = {one.name: motion.state(one.name) for one in model.signals if one.kind == "sensor"}
+        sensors = [(k, one) for k, one in enumerate(model.signals) if one.kind == "sensor"]
+        read = [(k, motion.state(one.name), one.resolution, one.noise * (one.resolution or 1.0)) for k, one in sensors]
         assert self._call("init") == 0
         assert self._call("start")
         sample, drive = np.zeros(len(model.signals), np.float32), np.zeros(max(len(self._drives), 1), np.float32)
+        given = pointers_to(sample, drive)
+        step, work = (getattr(self._c, f"{self._name}_commission_{what}") for what in ("step", "work"))
 
         def control(_: float, state: np.ndarray[Any, Any]) -> dict[str, float]:
-            for k, one in enumerate(model.signals):
-                if one.kind == "sensor":
-                    x = float(state[places[one.name]])
-                    noise = one.noise * (one.resolution or 1.0) * rng.standard_normal()
-                    lsb = one.resolution
-                    sample[k] = lsb * np.rint((x + noise) / lsb) if lsb else x + noise
-            self._call("step", *pointers_to(sample, drive))
-            while self._call("work"):
+            for k, place, lsb, sd in read:
+                x = float(state[place]) + sd * rng.standard_normal()
+                sample[k] = lsb * round(x / lsb) if lsb else x
+            step(*given)
+            while work():
                 pass
-            return dict(zip(self._drives, map(float, drive), strict=False))
+            return dict(zip(self._drives, drive.tolist(), strict=False))
 
         p = np.array([truth.get(one.name, one.guess) for one in model.unknowns])
         constants = self._plant.constants(p, {one.name: one.value for one in model.knowns})

@@ -215,6 +215,7 @@ class _Limits:
         self.compiled, self.limits, self.sample_rate, self.burst_s = compiled, limits, sample_rate, burst_s
         self.of_drive = of_drive
         self._t = np.arange(round(burst_s * sample_rate)) / sample_rate
+        self._simulation: RigSimulation | None = None
 
     def slew(self, name: str) -> float:
         """Largest change of a drive [unit/s]; where none is given, the whole limit in ten ticks."""
@@ -234,7 +235,8 @@ class _Limits:
             sample_rate=self.sample_rate,
             duration=duration,
         )
-        return RigSimulation.of(self.compiled, rig)
+        self._simulation = self._simulation or RigSimulation.of(self.compiled, rig)
+        return self._simulation.of_rig(rig)
 
     def scaled(self, tones: _Tones) -> _Tones:
         """The largest drives of these shapes, of which neither they nor the simulated motion leave the limits."""

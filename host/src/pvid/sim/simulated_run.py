@@ -75,6 +75,10 @@ class RigSimulation:
         plant = Plant(with_whole_equations(model) if whole else model)
         return cls(replace(model, signals=exact, knowns=knowns, clock_sd=0.0), rig, plant, linearised, whole)
 
+    def of_rig(self, rig: SimulatedRig) -> RigSimulation:
+        """Another rig of the mechanism, with values of the same unknowns."""
+        return RigSimulation(self.model, rig, self.plant, self.linearised, self.whole)
+
     @property
     def truth(self) -> Float:
         """Values of the unknowns [n_p]."""
