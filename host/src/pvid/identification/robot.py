@@ -135,7 +135,8 @@ class RobotAnswer(Answer):
             weak = [one.name for one, sd in zip(self.prediction, noise, strict=True)
                     if one.r2 < _EXPLAINED and one.rms > _NOISY * sd]  # fmt: skip
         if weak:
-            outside = ", or what touches the base: the ground, thrust (wrench=True)" if chain.free and 0 in fit.run.idle else ""
+            loose = chain.free > 0 and 0 in fit.run.idle
+            outside = ", or what touches the base: the ground, thrust (wrench=True)" if loose else ""
             text = (
                 f"less than {_EXPLAINED:.0%} of {listed(weak)} is explained on unseen motion: check signs, units, gear "
                 f"ratios and the order of the joints, or a drive that bends{outside}"
