@@ -60,13 +60,6 @@ def played(given: Float, config: RefineConfig, off: tuple[float, float, float]) 
     return RefineNative(Native(), config).run(given, *weak(len(given), off))
 
 
-def test_a_good_start_is_refined() -> None:
-    core = played(samples(9.0, 2.0), configuration(), (0.01, -0.01, 0.01))
-    assert Reason.UPDATED in core.reason
-    # a quarter of the blocks of the whole run: some times the bound of .007 % for 40 s
-    assert np.max(np.abs(core.r[-1, :3] / TRUTH - 1)) < 2e-3
-
-
 def test_faults_of_all_kinds() -> None:
     """Outliers, a stuck encoder, missing samples of both sensors, a jump of the offset."""
     given = samples(9.0, 2.0).copy()

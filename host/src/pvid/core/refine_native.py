@@ -43,7 +43,7 @@ class RefineNative:
 
     def __init__(self, native: Native, config: RefineConfig) -> None:
         self.native = native
-        self._samples = 1 + max(one.sample for one in config.signal)
+        samples = 1 + max(one.sample for one in config.signal)
         headers = native.headers
         shape = np.zeros(8, np.uint32)
         native.library.pvid_replay_refine_shape(headers.pointer(shape))
@@ -51,34 +51,10 @@ class RefineNative:
         self._filled = headers.filled("pvid_refine_config_f32", config)
         self.state: Any = headers.ffi.new("pvid_refine_f32 *")
         self._hash = np.array([0x811C9DC5], np.uint32)
-        status = self.initialise()
+        address = headers.ffi.addressof(self._filled.struct)
+        status = Status(native.library.pvid_refine_init_f32(self.state, address, samples, headers.ffi.NULL))
         if status is not Status.OK:
             raise PvidError(f"the core refused the settings of the refinement: {status.text}")
-
-    @property
-    def config_struct(self) -> Any:
-        """The configuration in C."""
-        return self._filled.struct
-
-    def initialise(self) -> Status:
-        """Runs init on the present configuration."""
-        ffi = self.native.headers.ffi
-        address = ffi.addressof(self._filled.struct)
-        return Status(self.native.library.pvid_refine_init_f32(self.state, address, self._samples, ffi.NULL))
-
-    def freeze(self, frozen: bool) -> None:
-        """pvid_refine_freeze_f32."""
-        self.native.library.pvid_refine_freeze_f32(self.state, frozen)
-
-    def gap(self) -> None:
-        """Samples are missing before the next call of `run`."""
-        self.native.library.pvid_refine_gap_f32(self.state)
-
-    @property
-    def estimate(self) -> npt.NDArray[np.void] | None:
-        """The published estimate; None: there is none."""
-        number = int(self.state.mark.number[0])
-        return self.native.headers.viewed(self.state.estimate) if number else None
 
     def run(self, samples: npt.ArrayLike, weak_p: npt.ArrayLike, weak_se: npt.ArrayLike) -> RefineRecord:
         """Steps through samples [ticks, samples] with the weak form's estimates at the ticks at which they are new
