@@ -39,5 +39,6 @@ def test_a_value_is_shown_to_the_second_digit_of_its_error(value: float, error: 
 
 
 def test_a_part_beyond_all_measure_has_no_digits() -> None:
-    assert (percent(0.00312), percent(5.91), percent(1e300)) == ("0.31 %", "591 %", "more than 10000 %")
+    assert (percent(0.00312), percent(0.9999), percent(5.91)) == ("0.31 %", "100 %", "591 %")
+    assert percent(1e300) == "more than 10000 %"
     assert (part_of_one(0.99, 3), part_of_one(-3.5, 3), part_of_one(-1e300, 3)) == ("0.990", "-3.500", "below -100")

@@ -218,9 +218,9 @@ def test_page_shows_the_names_and_units_of_the_mechanism(logs: dict[str, Path]) 
     for first in range(0, len(data), 5000):
         state.take(data[first : first + 5000])
     shown = json.loads(state.as_json())
-    assert "weak form of dc_motor" in shown["board"] and shown["lost"] == ""
+    assert ": dc_motor, float32" in shown["board"] and shown["lost"] == ""
     assert [row["name"] for row in shown["parameters"]] == ["R", "L", "k", "J", "b", "Tc", "i0"]
-    assert [row["unit"] for row in shown["parameters"]][:4] == ["ohm", "H", "N*m/A", "kg*m²"]
+    assert [row["unit"] for row in shown["parameters"]][:4] == ["Ω", "mH", "mN·m/A", "×10⁻⁴ kg·m²"]
     assert [curve["label"] for curve in shown["motion"]] == ["V [V]", "i [A]", "phi [rad]"]
     assert [len(curve["x"]) > 100 for curve in shown["motion"]] == [True] * 3
     assert len(shown["estimates"]["curves"]) == 7 and "noise of the sensors" in shown["residual"]
@@ -229,7 +229,7 @@ def test_page_shows_the_names_and_units_of_the_mechanism(logs: dict[str, Path]) 
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("dc_motor", ("Tc [N*m]", "phi [rad]", "kappa of R", "weak form of dc_motor", f"{TICKS} samples")),
+        ("dc_motor", ("Tc [N*m]", "phi [rad]", "excitation of R", ": dc_motor, float32", f"{TICKS} samples")),
         ("heated_plate", ("C [J/K]", "T [K]", f"{TICKS} samples")),
     ],
 )

@@ -27,8 +27,8 @@ def test_a_mechanism_is_identified_compared_and_streamed(
     assert told.count("equal on board, PC and in numpy in every bit (hash ") == 2
     assert told.count("truth ") == 7 and "✗" not in told
     assert re.search(r"First answer after \d{4} s[;.]", told)
-    assert ("instructions a tick" in told) == (target != HOST_TARGET)
-    assert "14400 ticks of" in told and "Integers only (first stage): " in told and "The paper's own form" in told
+    assert ("instructions a sample" in told) == (target != HOST_TARGET)
+    assert "14400 samples, " in told and "Integers only (first stage): " in told and "The paper's own form" in told
     assert len(told.splitlines()) <= 10
     assert (tmp_path / "a.png").stat().st_size > 10_000
 

@@ -100,7 +100,7 @@ def test_the_core_identifies_a_recording_as_the_oracle_does(name: str, arithmeti
 
 
 def test_the_answer_is_a_table_with_the_reason_of_the_last_window(recorded: dict[str, Path]) -> None:
-    answer = pvid("identify", recorded["rigid_body"], "--core", "f32")
+    answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--verbose")
     assert answer.return_value == DONE
     assert "weak form, C in float32" in answer.stdout and "Ixx [kg*m^2]" in answer.stdout
     assert "last window: updated; valid; chi2 " in answer.stdout

@@ -44,7 +44,8 @@ model.equation(theta.d(2) + b * theta.d() + w * sin(theta))
 def test_a_table_of_80_columns_loses_no_letter() -> None:
     one = Value("N*m/A", 7.811e-07, 7.8e-09, se_noise=4.1e-09, se_scale=7.8e-09, se_model=6.5e-09, word="not_explained")
     shown = StringIO()
-    Console(file=shown, width=80).print(table_of({"k": one, "torque": replace(one, word="not_identified")}, "motor"))
+    values = {"k": one, "torque": replace(one, word="not_identified")}
+    Console(file=shown, width=80).print(table_of(values, "motor", {}, parts=True))
     assert "…" not in shown.getvalue() and "not_identified" in shown.getvalue() and "7.811" in shown.getvalue()
 
 

@@ -60,7 +60,7 @@ def test_every_column_is_told_in_the_numbers_of_the_file(file: Path) -> None:
     assert facts["wild"].remarks == ("10 samples are far from those about them, most often -1 mm",)
     assert facts["half"].remarks == ("50 % of the rows have no number",)
     assert len(facts["clipped"].remarks) == 1 and "largest value 0.08 V in 8 stretches" in facts["clipped"].remarks[0]
-    assert "'arm' is not a number" in facts["name"].remarks[0] and np.isnan(facts["name"].low)
+    assert facts["name"].remarks == ("no numbers, as in 'arm'",) and np.isnan(facts["name"].low)
     assert facts["level"].remarks == ("never changes",)
     assert facts["row"].is_even
     assert lines_of_a_model(survey)[:2] == (
@@ -180,12 +180,40 @@ def test_the_command_that_is_printed_identifies(mechanism: str, foreign: bool, t
         ("speed_rpm", "rpm"),
         ("i [A]", "A"),
         ("motor_a", ""),
+        ("ref_V", "V"),
+        ("T_air(C)", "C"),
         ("theta_m", ""),
         ("x", ""),
     ],
 )
 def test_a_unit_in_a_name_is_one_beyond_doubt(name: str, unit: str) -> None:
     assert unit_of_name(name) == ("rev/min" if unit == "rpm" else unit)
+    assert unit_of_name("i_V", ("i_U", "i_V", "i_W")) == unit_of_name("coil_A", ("coil_A", "coil_B")) == ""
+
+
+def test_what_students_export_has_names_units_and_the_command_to_type(tmp_path: Path) -> None:
+    """A track of a film, whose first row has blank cells; a thermometer with a date and words; a switched voltage."""
+    t = np.arange(600) / 60
+    x = 6.3 * np.exp(-0.11 * t) * np.cos(11.3 * t) + 1.7
+    rows = [f"{a:.6E}\t{b:.6E}\t" if k % 97 else f"{a:.6E}\t\t" for k, (a, b) in enumerate(zip(t, x, strict=True))]
+    (tmp_path / "track.txt").write_text("\n".join(["mass A\t\t", "t\tx (cm)\tnote", *rows]) + "\n", encoding="utf-8")
+    seen = pvid("look", tmp_path / "track.txt").stdout
+    assert "track.txt --model ring_down --columns 'x=x (cm)'" in seen and "note" in seen and "no numbers" in seen
+    clock = [
+        f"2026-03-02,14:{k // 60:02}:{k % 60:02},{50 - k / 100 + (k % 3) / 50:.2f},{21.4 + k % 2 / 100}"
+        for k in range(900)
+    ]
+    (tmp_path / "tea.csv").write_text("\n".join(["Date,Time,Temp(C),Air(C)", *clock]) + "\n", encoding="utf-8")
+    seen = pvid("look", tmp_path / "tea.csv").stdout
+    assert "--model cooling --columns 't=Time,T=Temp(C),Ta=Air(C)'" in seen and "no numbers, as in '2026-03-02'" in seen
+    switched = 5.0 * (np.arange(900) // 200 % 2) + 0.04 * np.random.default_rng(1).integers(-1, 2, 900)
+    rows = [f"{k / 100},{one:.2f}" for k, one in enumerate(switched)]
+    (tmp_path / "scope.csv").write_text("\n".join(["t,CH1", *rows]) + "\n", encoding="utf-8")
+    assert "a counter" not in pvid("look", tmp_path / "scope.csv").stdout
+    (tmp_path / "still.csv").write_text(
+        "\n".join(["t,V", *(f"{k / 100},5" for k in range(900))]) + "\n", encoding="utf-8"
+    )
+    assert "Nothing moves in this recording" in pvid("look", tmp_path / "still.csv").stdout
 
 
 def test_what_is_no_table_is_one_sentence(tmp_path: Path) -> None:

@@ -285,7 +285,7 @@ def test_a_folder_is_watched(tmp_path: Path, inline: list[str], monkeypatch: pyt
     done = CliRunner().invoke(commands, ["watch", str(folder), "-o", str(out)], standalone_mode=False)
     assert done.return_value == CHANGED, done.exception
     assert inline == [f"{k}.csv" for k in range(7)] and read_rows(out)[-1].samples == 3
-    assert done.stdout.count(f"changed: {folder}: g rose by 11 % (9.50 to 10.50 m/s^2) between 6 and 7 January") == 1
+    assert done.stdout.count(f"changed: {folder}: g rose by 11 % (9.50 to 10.50 m/s²) between 6 and 7 January") == 1
     assert 'http-equiv="refresh" content="10"' in out.with_suffix(".html").read_text()
 
 

@@ -1,12 +1,14 @@
 """What changed in a fleet: found beyond chance, named with its date, not hidden by warnings or by errors of scale."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from browser import chromium
 from fleet_rows import DAY, row
 
 from pvid.fleet.changes import FALSE_ALARMS, Change, Series
@@ -81,13 +83,28 @@ def fleet(**other: Any) -> list[Row]:
 def test_the_page_says_what_changed_with_warnings_or_without(warning: str | None) -> None:
     found = Fleet.of(fleet(warning=warning))
     (alarm,) = found.changes(alarms=True)
-    words = "moving: g fell by 2 % (9.500 to 9.310 m/s^2) steadily from 2 to 11 January 1970"
+    words = "moving: g fell by 2 % (9.500 to 9.310 m/s²) steadily from 2 to 11 January 1970"
     assert sentence(*alarm) == words and found.title == "Fleet of 2 boards, 2 to 11 January 1970"
     text = page(found, "pvid batch <all>")
     assert f'<strong class="bad">{words}</strong>' in text and "pvid batch &lt;all&gt;" in text
     assert "g 3.2 %" in text and ("2.1e-05 s (alike in 20 of 20 recordings)" in text) == (warning is not None)
     assert text.count("as of all") == (20 if warning else 0) and "http:" not in text.split("<svg")[0]
     assert "refresh" not in text and 'http-equiv="refresh" content="7"' in page(found, "", refresh=7)
+
+
+@pytest.mark.parametrize("width", [390, pytest.param(820, marks=pytest.mark.night)])
+def test_the_page_fits_a_screen(width: int, tmp_path: Path) -> None:
+    """Nothing is wider than a telephone but a table in a box of its own on wider screens."""
+    rows = [replace(one, path="fleet/" + 40 * "long" + ".csv") for one in fleet(warning="phi is late")]
+    (tmp_path / "fleet.html").write_text(page(Fleet.of(rows), "pvid batch"), encoding="utf-8")
+    wide = "(one) => one.scrollWidth > one.clientWidth + 1 && one.clientWidth"
+    with chromium(tmp_path / "chromium", width, 900) as browser:
+        browser.get((tmp_path / "fleet.html").as_uri())
+        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        found = browser.execute_script(
+            f"return [...document.querySelectorAll('body, body :not(svg *)')].filter({wide}).length"
+        )
+        assert found == 0 or width > 500
 
 
 def test_a_small_change_is_told_and_is_no_alarm() -> None:
@@ -160,5 +177,5 @@ def test_a_board_that_differs_from_all_others_is_named() -> None:
         values = {"b1": 10.0, "b2": 10.1, "b3": 9.9, "b4": last}
         return Fleet.of([row(board, day, value + 0.001 * day) for board, value in values.items() for day in range(3)])
 
-    assert fleet(20.0).odd == ["b4: g is 20.0 m/s^2, of all other boards 9.9 to 10.1"]
+    assert fleet(20.0).odd == ["b4: g is 20.0 m/s², of all other boards 9.9 to 10.1"]
     assert not fleet(10.2).odd

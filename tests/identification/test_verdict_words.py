@@ -75,7 +75,7 @@ def test_every_printer_has_the_word_of_the_answer_and_of_each_parameter() -> Non
         assert {one["verdict"] for one in shown["parameters"].values()} == {words[1]}
         assert result["T"].verdict == found.values["pole"].word == words[1]
         console = Console(file=(text := io.StringIO()), width=120)
-        console.print(table_of(found.values, ""))
+        console.print(table_of(found.values, "", {}))
         assert ("usable" in text.getvalue()) == (words[1] == "usable")
 
 

@@ -466,7 +466,7 @@ def test_a_field_log_is_drawn_and_identified_with_its_own_settings(tmp_path: Pat
     assert done.returncode == 0, done.stderr
     drawn = pvid(tmp_path, "plot", "a.pvlog", "-o", "a.svg")
     assert drawn.returncode == 0, drawn.stderr
-    assert "weak form of kapitza" in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert ": kapitza, float32" in (tmp_path / "a.svg").read_text(encoding="utf-8")
     found = json.loads(pvid(tmp_path, "identify", "a.pvlog", "--json").stdout)
     stream = LogReader(tmp_path / "a.pvlog")
     ticks = sum(record.item.count for record in stream if isinstance(record.item, link.Raw | link.RawCount))

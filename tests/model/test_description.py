@@ -57,6 +57,7 @@ def test_shipped_mechanisms_have_few_theta_and_compile_in_no_time(name: str) -> 
     assert [len(row.theta) for row in compiled.rows] == thetas
     assert len(compiled.p) == unknowns
     assert compiled.name == name
+    assert {*compiled.p_names, *(one.name for one in compiled.outputs)} <= compiled.meanings.keys()
 
 
 @pytest.mark.parametrize("name", names())

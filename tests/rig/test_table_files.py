@@ -496,6 +496,8 @@ def test_units_of_every_dimension(si: str, unit: str, one: float) -> None:
 def test_temperatures_have_an_offset() -> None:
     kelvin = (Channel("T", "K"),)
     assert Columns.parse("T=T:degC", kelvin)["T"].in_si(np.array([20.0]))[0] == 293.15
+    assert Columns.parse("T=T:C", kelvin)["T"].in_si(np.array([20.0]))[0] == 293.15  # no charge
+    assert Columns.parse("T=T:degF", kelvin)["T"].in_si(np.array([68.0]))[0] == pytest.approx(293.15, rel=1e-12)
     for unit, part in (("-degC", "offset"), ("degC/10", "offset"), ("V", "'V' is no unit of T; it is K, degC or")):
         with pytest.raises(PvidError, match=re.escape(part)):
             Columns.parse(f"T=T:{unit}", kelvin)

@@ -14,7 +14,7 @@ from own_mechanisms import OWN, own_recording
 import pvid
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.models.mechanisms import path_of
+from pvid.models.mechanisms import compiled_of, path_of
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import write_recording
 from pvid.show.report import line_to_type
@@ -47,6 +47,8 @@ class Page(HTMLParser):
         self.ids += [value for name, value in attributes if name == "id" and value is not None]
         if tag not in VOID:
             self.open.append(tag)
+        elif tag == "br" and self.open[-1] == "td":  # below the name of a parameter: what it is
+            self.cells[-1][-1] += "\n"
         if tag == "h2":
             self.headings.append("")
         elif tag == "tr":
@@ -75,8 +77,8 @@ class Page(HTMLParser):
         return " ".join("".join(self.words).split())
 
     def row(self, name: str) -> list[str]:
-        """The first one whose first cell is this."""
-        return next(one for one in self.cells if one and one[0] == name)
+        """The first one whose first cell begins with this line."""
+        return next(one for one in self.cells if one and one[0].partition("\n")[0] == name)
 
 
 def checked(path: Path, but: tuple[str, ...] = ()) -> Page:
@@ -133,6 +135,8 @@ def test_report_of_every_mechanism_has_the_values_of_the_result_and_all_sections
         low, high = one.interval()
         prefix = 10.0 ** np.round(np.log10(abs(one.value / float(told.value))))
         rounded = float(0.51 * prefix) * 10.0 ** -len(told.low.partition(".")[2])  # half of the last digit
+        meaning = row[0].partition("\n")[2]
+        assert meaning == ("" if model else compiled_of(name).meanings[one_name])
         assert rounded < 0.05 * (high - low) and float(told.low) * prefix == pytest.approx(low, abs=rounded)
     for sensor in result.unseen.sensors if result.unseen is not None else ():
         assert page.row(sensor.name)[0] == sensor.name
@@ -174,7 +178,7 @@ def test_report_names_the_missing_term_and_the_line_to_type(
 ) -> None:
     text = path_of("dc_motor")[1].read_text(encoding="utf-8")
     text = text.replace(" + Tc * sgn(phi.d())", "").replace(', Tc = model.unknown("J"', ' = model.unknown("J"')
-    text = text.replace(', model.unknown("Tc", "N*m", 0.012)', "")
+    text = text.replace(', model.unknown("Tc", "N*m", 0.012)', "").replace('Tc="dry friction", ', "")
     (tmp_path / "plain.py").write_text(text, encoding="utf-8")
     words = ["identify", str(runs / "dc_motor.csv"), "--model", str(tmp_path / "plain.py"), "--rig"]
     words += [str(runs / "dc_motor.toml"), "--report", str(tmp_path / "a.html")]

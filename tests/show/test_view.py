@@ -66,7 +66,7 @@ def test_view_shows_every_item(sent: list[bytes]) -> None:
     for name in ("g", "l2", "rho2", "w", "d1", "d2", "c"):
         shown, spread = with_error(newest[name], newest[f"{name}_se"])
         assert f"{shown}  ± {spread}" in seen
-    assert "field: weak form of kapitza, core f32, 1000 samples per second" in seen
+    assert "field: kapitza, float32, 1000 samples per second" in seen
     assert f"{TICKS} samples" in seen and "lost       nothing" in seen
     assert f"{newest['kappa']:.2g}  good" in seen and "times the noise of the sensors" in seen
     assert "updated" in seen and "the estimate was updated" in seen
@@ -315,7 +315,7 @@ def test_log_draws_on_a_terminal_and_leaves_the_last_picture(tmp_path: Path, boa
     terminal = Terminal(tmp_path, "--duration", "4")
     seen = terminal.read_to_end()
     assert terminal.process.returncode == 0, seen
-    assert "has not described itself yet" in seen or "weak form" in seen
+    assert "has not described itself yet" in seen or "samples per second" in seen
     last = seen[seen.rindex("╭") :]
     assert "d2 " in last and f"{samples_in(tmp_path / 'out.pvlog')} samples in 1 segment" in last
     assert last.count("ended") >= 1 and "Ctrl-C ends" not in last

@@ -12,7 +12,7 @@ from conftest import ROOT
 
 from pvid.base.packages import PACKAGES
 
-MODULES_OF_EXTRAS = {"plot": ["matplotlib"], "serial": ["serial"]}
+MODULES_OF_EXTRAS = {"plot": ["matplotlib"], "serial": ["serial"], "parquet": ["pyarrow"]}
 NOTEBOOKS = sorted((ROOT / "host" / "notebooks").glob("*.ipynb"))
 
 

@@ -37,7 +37,7 @@ def percent(part: float) -> str:
     shown = 100.0 * part
     if shown > _MOST_PERCENT:
         return f"more than {_MOST_PERCENT} %"
-    return f"{shown:.2g} %" if abs(shown) < 100.0 else f"{shown:.0f} %"
+    return f"{shown:.2g} %" if abs(shown) < 99.5 else f"{shown:.0f} %"
 
 
 # Units that take a prefix, and prefixes by the power of 1000.

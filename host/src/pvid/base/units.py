@@ -142,6 +142,10 @@ def usual(si: str) -> tuple[str, ...]:
     return known or ((si, f"m{si}", f"k{si}") if f"|{si}" in _DERIVED or si in _BASE else (si,))
 
 
+_CELSIUS, _FAHRENHEIT = Scale(offset=273.15), Scale(5.0, 9.0, 459.67 * 5 / 9)
+_TEMPERATURES = {"degC": _CELSIUS, "C": _CELSIUS, "degF": _FAHRENHEIT, "F": _FAHRENHEIT}  # C, F: no charge, capacitance
+
+
 def scale_to(si: str, text: str) -> Scale | None:
     """Of a unit to a signal's SI unit; None where the text is no unit, or not of that dimension."""
     text = spelled(text)
@@ -152,8 +156,8 @@ def scale_to(si: str, text: str) -> Scale | None:
         text = text.lower() if unit_of(text) != wanted and len(text) < 3 else text  # MS, S
     if si == "rad/s" and text in ("1/min", "min^-1"):
         text = "rev/min"
-    if text in ("degC", "K") and wanted == _BASE["K"]:
-        return Scale(offset=273.15 if text == "degC" else 0.0)
+    if wanted == _BASE["K"] and (temperature := _TEMPERATURES.get(text)):
+        return temperature
     if wanted is None:
         return None
     if wanted.dimension == _GRAVITY.dimension and text in ("g", "G", "g0", "mg"):

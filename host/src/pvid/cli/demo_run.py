@@ -143,7 +143,7 @@ def _in_float(shown: Demonstrated, target: str, figure: Path) -> bool:
     texts += [] if measured is None else [_words(measured)]
     if texts:
         click.echo(f"{'; '.join(texts)}.")
-    click.echo(f"{_bits(f'{ticks} ticks of {stages} in float32', there, [first, second])}.")
+    click.echo(f"{_bits(f'{ticks} samples, {stages} in float32:', there, [first, second])}.")
     convergence(answer, weak, refined, shown.truth, shown.names, figure)
     return there.equal and first.equal and (isinstance(second, str) or second.equal)
 
@@ -164,13 +164,13 @@ def _in_fixed_point(shown: Demonstrated, target: str) -> bool:
         click.echo(f"{form}: {error}.")
         return True
     said = _line(shown, found.values) if found.identified else f"nothing identified, {found.reason.text}"
-    click.echo(f"{form}: {said}; {_bits('all ticks', there, [here])}.")
+    click.echo(f"{form}: {said}; {_bits('all samples', there, [here])}.")
     return there.equal and here.equal
 
 
 def _by_the_paper(shown: Demonstrated, seed: int) -> None:
     """The strong form on this computer, in a line. It differentiates its samples, and needs finer ones."""
-    form = f"The paper's own form (derivatives, a row, its sums, a solution at each tick), sensors {_FINER} times finer"
+    form = f"The paper's own form (derivatives and a solution at each sample), with sensors {_FINER} times finer"
     try:
         values = _strong(shown, seed)
     except PvidError as error:
@@ -207,8 +207,8 @@ def _first(weak: CoreAnswer) -> float | None:
 def _words(cost: Cost) -> str:
     bytes_ = cost.footprint.bss + cost.footprint.data
     return (
-        f"{cost.footprint.mean} instructions a tick on average, {cost.footprint.longest} in the longest tick observed; "
-        f"{bytes_ / 1000:.1f} kB of RAM"
+        f"{cost.footprint.mean} instructions a sample on average, {cost.footprint.longest} in the longest one "
+        f"observed; {bytes_ / 1000:.1f} kB of RAM"
     )
 
 
@@ -229,7 +229,14 @@ def _table(shown: Demonstrated, values: Mapping[str, Value]) -> None:
     for _ in range(columns):
         for justify in ("left", "right", "left", "left"):
             table.add_column(justify=justify, no_wrap=True)
-    cells = [_cells(name, values[name], shown.truth[name]) for name in shown.names if values[name].value is not None]
+    if columns == 1:
+        table.add_column(no_wrap=True)  # what it is
+    meanings = shown.answer.model.meanings
+    cells = [
+        (*_cells(name, values[name], shown.truth[name]), *([] if columns > 1 else [meanings.get(name, "")]))
+        for name in shown.names
+        if values[name].value is not None
+    ]
     rows = -(-len(cells) // columns)
     for row in range(rows):
         table.add_row(*[cell for one in cells[row::rows] for cell in one])

@@ -68,7 +68,10 @@ from pvid.settings.cores import FLOAT
     type=click.Path(path_type=Path),
     help="Of a robot: RUN0 is without its payload, whose mass, centre and inertia are then identified.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--json", "style", flag_value="json", help="Print one JSON object.")
+@click.option(
+    "--verbose", "style", flag_value="verbose", help="Also print parts of the errors, residuals, windows, hashes."
+)
 @click.option("--report", type=NewFile(), help="Write a report: one HTML page with the answer in words and pictures.")
 @click.option(
     "--figure", type=FigurePath(), help="Write a figure: measured against predicted, convergence (png, svg, pdf)."
@@ -92,7 +95,7 @@ def command(
     empty: Path | None,
     own: tuple[str, ...],
     shared: tuple[str, ...],
-    as_json: bool,
+    style: Literal["json", "verbose"] | None,
     report: Path | None,
     figure: Path | None,
 ) -> int:
@@ -139,8 +142,8 @@ def command(
         run_paths,
         rig,
         columns,
-        as_json=as_json,
-        pictures=Pictures(figure, report, made, as_json),
+        style=style or "plain",
+        pictures=Pictures(figure, report, made, style == "json"),
         weights=weights or "residuals",
         refine=refine,
         other=other,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 from rich.console import Console
@@ -24,7 +24,7 @@ from pvid.identification.analysis import analysed, own_of
 from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
-from pvid.identification.summary import Made, summary
+from pvid.identification.summary import Made, head, summary
 from pvid.log.rig import source_of
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 IN_C = (*(("core", name) for name in CORES), ("form", "weak"))  # options of the weak form, and their values
 STRONG_FORM = "strong"  # as --form
+Style = Literal["plain", "verbose", "json"]  # of what is printed; verbose: with words of the method
 LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
 
@@ -70,7 +71,7 @@ def identify_run(
     rig: MechanismRig,
     columns: str | None,
     *,
-    as_json: bool,
+    style: Style,
     pictures: Pictures,
     weights: Weights = "residuals",
     refine: bool | None = None,
@@ -104,7 +105,7 @@ def identify_run(
         asked: dict[str, Any] = {"--on": on, "--refine": refine, "--add": add, "--own": own, "--shared": shared}
         asked |= {"--weights": weights != "residuals", "--figure": pictures.figure, "--report": pictures.report}
         asked |= {f"--{option} {value}": value for option, value in only_in_c.items()}
-        return _identified_robot(paths, rig, columns, other, empty, write_model, asked, as_json=as_json)
+        return _identified_robot(paths, rig, columns, other, empty, write_model, asked, style=style)
     if empty is not None:
         raise PvidError(f"--without is for the payload of a robot, which {name} is not: omit it")
     if len(paths) > 1:
@@ -112,7 +113,7 @@ def identify_run(
     if only_in_c.get("form") == STRONG_FORM:
         if pictures.figure is not None or refine or weights != "residuals" or add:
             raise PvidError("--figure, --refine, --weights and --add are for the weak form; omit --form strong")
-        return _identified_by_strong_form(paths[0], rig, columns, pictures, as_json=as_json, on=on, **only_in_c)
+        return _identified_by_strong_form(paths[0], rig, columns, pictures, style=style, on=on, **only_in_c)
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in (("core", "f64"), *IN_C):
             raise PvidError(
@@ -152,7 +153,7 @@ def identify_run(
         answer = identified(recording, model, weights, refine=in_float, own=of_each)
     if without is not None:
         with_them: dict[str, Any] = {"added": list(more.terms), "without": _values_json(without.values)}
-        if not as_json:
+        if style != "json":
             Console().print(_beside(without.values, answer.values, more.terms))
         if write_model is not None:
             write_whole(write_model, more.text_of(answer))
@@ -167,7 +168,7 @@ def identify_run(
             core = identify_in_c(answer, in_c.name)
     if core is not None and refine:
         try:
-            return _refined_in_c(core, pictures, as_json=as_json, on=on)
+            return _refined_in_c(core, pictures, style=style, on=on)
         except PvidError as error:  # the answer is that of the first stage
             no_second = {"refinement": {"adopted": False, "text": f"not refined: {error}"}}
             write_stderr(f"pvid: note: not refined: {error}")
@@ -175,7 +176,8 @@ def identify_run(
     validation = _predicted(other, rig, columns, shown)
     entries = no_second | _validation_json(validation) | ({} if without is None else with_them)
     lines = [] if validation is None else [f"{other}: the answer {validation.text}"]
-    done = _told(shown, as_json=as_json, more=entries | ({} if on is None else {"on": on}), lines=lines)
+    style = "verbose" if refine and style == "plain" else style  # which estimate it is, and why
+    done = _told(shown, style=style, more=entries | ({} if on is None else {"on": on}), lines=lines)
     if core is None and not model.following.is_usual:
         write_stderr("pvid: note: the analysis in float64 takes all windows alike: [identifier] has no effect")
     pictures.write(shown, validation, "" if other is None else other.name)
@@ -191,7 +193,7 @@ def _identified_robot(
     written: Path | None,
     asked: Mapping[str, Any],
     *,
-    as_json: bool,
+    style: Style,
 ) -> int:
     """Identifies recordings of a robot and prints the answer."""
     from pvid.identification.robot import answer_of_robot, payload_of
@@ -230,7 +232,7 @@ def _identified_robot(
         }
         lines += [f"payload {name}: {value} +- {se} {payload[name].unit}" for name, (value, se) in known.items()]
         lines += [f"payload {name}: {one.reason}" for name, one in payload.items() if name not in known]
-    return _told(answer, as_json=as_json, more=more, lines=lines)
+    return _told(answer, style=style, more=more, lines=lines)
 
 
 def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> None:
@@ -243,7 +245,7 @@ def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> Non
 
 
 def _identified_by_strong_form(
-    path: Path, rig: MechanismRig, columns: str | None, pictures: Pictures, *, as_json: bool, **given: str | None
+    path: Path, rig: MechanismRig, columns: str | None, pictures: Pictures, *, style: Style, **given: str | None
 ) -> int:
     """Identifies a recording by the strong form and prints the answer."""
     from pvid.identification.strong import identify_strong_mechanism
@@ -255,7 +257,7 @@ def _identified_by_strong_form(
     if core in CORES:
         refuse_too_many_unknowns(model)
     answer = identify_strong_mechanism(recording, model, core, LAWS[given.get("law") or "stationary"])
-    done = _told(answer, as_json=as_json)
+    done = _told(answer, style=style)
     pictures.write(answer)
     return done
 
@@ -357,7 +359,7 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     return answer if answer.identified else None
 
 
-def _refined_in_c(core: CoreAnswer, pictures: Pictures, *, as_json: bool, on: str | None) -> int:
+def _refined_in_c(core: CoreAnswer, pictures: Pictures, *, style: Style, on: str | None) -> int:
     """Refines an answer of the first stage by both stages in C and prints the refined estimate, or that of the first
     stage.
 
@@ -367,24 +369,28 @@ def _refined_in_c(core: CoreAnswer, pictures: Pictures, *, as_json: bool, on: st
 
     with working(f"refining in {FLOAT.words}"):
         found = refined_in_c(core)
-    done = _told(found, as_json=as_json, more={} if on is None else {"on": on})
+    done = _told(found, style="json" if style == "json" else "verbose", more={} if on is None else {"on": on})
     pictures.write(found)
     return done
 
 
-def _told(answer: Answer, *, as_json: bool, more: Mapping[str, Any] | None = None, lines: Sequence[str] = ()) -> int:
+def _told(answer: Answer, *, style: Style, more: Mapping[str, Any] | None = None, lines: Sequence[str] = ()) -> int:
     """Prints an answer and what is doubted of it; the exit code.
 
     Parameters
     ----------
     more, lines : further entries of the JSON object; further lines below the values
     """
-    if as_json:
+    if style == "json":
         click.echo(json.dumps(answer.as_json() | dict(more or {})))
     else:
         if answer.identified:
-            _table(answer.values, f"{answer.model.title}: {answer.identifier}")
-        for line in (*answer.lines, *lines):
+            verbose = style == "verbose"
+            title = f"{answer.model.title}: {answer.identifier}" if verbose else answer.model.title
+            Console().print(table_of(answer.values, title, answer.model.meanings, parts=verbose))
+        meaning = head(answer)[1].rstrip(".")
+        click.echo(f"verdict {answer.verdict.word}: {meaning[0].lower()}{meaning[1:]}")
+        for line in (*(answer.method if style == "verbose" else ()), *answer.lines, *_by_scale(answer), *lines):
             click.echo(line)
     for one in answer.doubts:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
@@ -416,35 +422,49 @@ def _beside(without: Mapping[str, Value], found: Mapping[str, Value], terms: Seq
     return table
 
 
-def _table(values: Mapping[str, Value], title: str) -> None:
-    Console().print(table_of(values, title))
-
-
 def _is_large(value: Value, part: str) -> bool:
     """Whether a part is most of a standard error."""
     return (getattr(value, part) or 0.0) > (value.se or 0.0) / 2
 
 
-def table_of(values: Mapping[str, Value], title: str) -> Table:
-    """Values by name with their standard errors, the parts of these where noise is not most of each, and the verdict
-    where one is not good."""
-    large = {"from scale": "se_scale", "from the model": "se_model"}
+def _by_scale(answer: Answer) -> Iterator[str]:
+    """What reduces the errors that a longer recording does not."""
+    large = [name for name, one in answer.values.items() if _is_large(one, "se_scale")]
+    if large:
+        of = "all" if len(large) == len(answer.values) else listed(large)
+        yield (
+            f"errors of {of}: most is of gains, constants and the clock, which a calibration reduces and a longer "
+            "recording does not"
+        )
+
+
+def table_of(values: Mapping[str, Value], title: str, meanings: Mapping[str, str], *, parts: bool = False) -> Table:
+    """Values by name with their standard errors, what they are, and the verdict where one is not good.
+
+    Parameters
+    ----------
+    parts : also those of the errors, where noise is not most of each
+    """
+    large = {"from scale": "se_scale", "from the model": "se_model"} if parts else {}
     large = {name: of for name, of in large.items() if any(_is_large(one, of) for one in values.values())}
     doubted = any(one.word != "good" for one in values.values())
     names = ("parameter", "estimate", "standard error", *(["from noise", *large] if large else []))
-    table = Table(*names, *([Column("verdict", no_wrap=True)] if doubted else []), title=title, min_width=len(title))
+    last: list[str | Column] = ["meaning"] if meanings else []
+    last += [Column("verdict", no_wrap=True)] if doubted else []
+    table = Table(*names, *last, title=title, min_width=len(title))
     for column in table.columns[: len(names)]:
         column.overflow = "fold"
     for column in table.columns[1 : len(names)]:
         column.justify = "right"
     for name, one in values.items():
         label = escape(f"{name} [{one.unit}]" if one.unit else name)
+        more = [meanings.get(name.partition("[")[0], "")] if meanings else []
+        more += [one.word] if doubted else []
         if one.value is None or one.se is None or one.se_noise is None:
-            table.add_row(label, "not determined", *[""] * (len(names) - 2), one.word)
+            table.add_row(label, "not determined", *[""] * (len(names) - 2), *more)
             continue
         estimate, error = with_error(one.value, one.se)
         below = "" if one.below is None else f" (below {one.below:.2g})"
-        parts = [one.se_noise, *(getattr(one, of) or 0.0 for of in large.values())] if large else []
-        word = [one.word] if doubted else []
-        table.add_row(label, estimate + below, error, *(f"{part:.2g}" for part in parts), *word)
+        sizes = [one.se_noise, *(getattr(one, of) or 0.0 for of in large.values())] if large else []
+        table.add_row(label, estimate + below, error, *(f"{size:.2g}" for size in sizes), *map(escape, more))
     return table

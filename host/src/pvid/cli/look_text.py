@@ -67,6 +67,8 @@ def _slow(one: ColumnFacts, survey: Survey) -> tuple[str, ...]:
 def _advice(survey: Survey) -> list[str]:
     found = proposals(survey)
     file = str(survey.path)
+    if not found and not any(one.low < one.high for one in survey.facts):
+        return ["Nothing moves in this recording: no mechanism can be found from it, nor identified."]
     if not found:
         return [
             f"No mechanism of the list (`{typed_name()} models`) has these columns. Yours is a model file of ten lines "

@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+from matplotlib.colors import to_hex
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
-from pvid.base.rounding import percent, prefix_of, with_prefix
+from pvid.base.rounding import percent, with_error
+from pvid.base.wording import listed
 from pvid.fleet.changes import Change, Float, Series, series_of
 from pvid.fleet.row import EQUAL, Row
+from pvid.identification.summary import unit_for
+from pvid.oracle.weak.words import WIDE
 from pvid.show import answer_figure as of
 from pvid.show.document import document, picture, table, text
 
 _MOST_COLORS = 6  # boards with a colour of their own; of more, those that changed
-_LONGEST = 40  # letters of a board in the figure's legend: its last ones
 _COLORS = ("C0", "C1", "C2", "C4", "C8", "C9")
-_PANEL_INCHES = 1.9
+_PANEL = (4.0, 2.2)  # inches
 _SHARED = 0.5  # of the recordings, from which on a warning is one of all
 _FEWEST_BOARDS, _ODD, _ODD_PART = 4, 4.0, 0.1  # that are compared; of the others' range, of its error; of the value
 _DIGITS = 0.1  # of a change: of the last two digits that are shown
@@ -72,13 +74,10 @@ class Fleet:
                 usual = float(np.median(others))
                 off = abs(value - usual)
                 if usual and off > max(_ODD * float(np.ptp(others)), _ODD_PART * abs(usual), _ODD * one.latest[1]):
-                    shown, _, unit, scale = with_prefix(value, off / 10, one.unit)
-                    among = " to ".join(
-                        with_prefix(float(end) / scale, off / scale / 10, "")[0] for end in _ends(others)
-                    )
-                    words = (
-                        f"{one.board}: {one.name} is {shown}{' ' + unit if unit else ''}, of all other boards {among}"
-                    )
+                    unit, scale = unit_for(abs(value), one.unit)
+                    shown, *ends = (with_error(each / scale, off / scale / 10)[0] for each in (value, *_ends(others)))
+                    among = " to ".join(dict.fromkeys(ends))
+                    words = f"{one.board}: {one.name} is {shown} {unit}".rstrip() + f", of all other boards {among}"
                     found.append((off / abs(usual), words))
         return [words for _, words in sorted(found, reverse=True)]
 
@@ -114,8 +113,9 @@ def _ends(values: Float) -> tuple[float, float]:
 def sentence(series: Series, change: Change) -> str:
     """What changed, as "motors/b3: R rose by 10 % (1.200 to 1.320 ohm) between 3 and 4 November 2026"."""
     error = max(float(np.min(series.noise)), _DIGITS * abs(change.after - change.before))
-    before, _, unit, scale = with_prefix(change.before, error, series.unit)
-    after = f"{change.after / scale:.{len(before.partition('.')[2])}f}" if "e" not in before else f"{change.after:.4g}"
+    unit, scale = unit_for(abs(change.before), series.unit)
+    before, _ = with_error(change.before / scale, error / scale)
+    after = f"{change.after / scale:.{len(before.partition('.')[2])}f}"
     how = f"{'rose' if change.after > change.before else 'fell'}"
     size = f" by {percent(abs(change.part))}" if np.isfinite(change.part) else ""
     step = change.kind == "step"
@@ -147,7 +147,7 @@ def page(fleet: Fleet, command: str, folder: Path | None = None, *, refresh: int
         _recordings(fleet, folder or Path()),
         f'<p class="quiet">{text(command)}</p>',
     ]
-    return document(fleet.title, "".join(parts), refresh=refresh)
+    return document(fleet.title, "".join(parts), refresh=refresh, broad=True)
 
 
 def _changed(fleet: Fleet) -> Iterator[str]:
@@ -209,9 +209,9 @@ def _means(fleet: Fleet) -> str:
         heads[name] = f"{name} [{unit}]" if unit else name
         for one in own:
             value, se = one.latest
-            boards.setdefault(one.board, {})[name] = " ± ".join(with_prefix(value / scale, se / scale, "")[:2])
+            boards.setdefault(one.board, {})[name] = " ± ".join(with_error(value / scale, se / scale))
     lines = [[text(board), *(text(of.get(name, "-")) for name in heads)] for board, of in sorted(boards.items())]
-    return table(("board", *map(text, heads.values())), lines, numbers=len(heads) + 1)
+    return table(("board", *map(text, heads.values())), lines, numbers=len(heads) + 1, cards=True)
 
 
 def _by_parameter(fleet: Fleet) -> dict[str, list[Series]]:
@@ -226,9 +226,7 @@ def _by_parameter(fleet: Fleet) -> dict[str, list[Series]]:
 def _scale(series: Sequence[Series]) -> tuple[str, float]:
     """Unit with an SI prefix or a power of ten, in which the values are near 1, and its size."""
     largest = max(float(np.abs(one.value).max()) for one in series)
-    unit, scale = prefix_of(largest, series[0].unit)
-    power = math.floor(math.log10(largest / scale)) if largest else 0
-    return (unit, scale) if -3 < power < 5 else (f"1e{power} {unit}".strip(), scale * 10.0**power)
+    return unit_for(largest, series[0].unit)
 
 
 def _recordings(fleet: Fleet, folder: Path) -> str:
@@ -238,6 +236,8 @@ def _recordings(fleet: Fleet, folder: Path) -> str:
         words += [one for one in _warnings(row) if _kind(one) not in fleet.shared]
         words += ["as of all"] if any(_kind(one) in fleet.shared for one in _warnings(row)) else []
         words += [row.verified] if row.verified not in (None, EQUAL) else []
+        wide = [name for name, (value, se, _) in row.parameters.items() if se > WIDE * abs(value)]
+        words += [f"large errors of {listed(wide)}"] if wide and row.verdict == "usable" else []
         name = text(row.path)
         if row.report is not None:
             name = f'<a href="{quote(os.fsencode(os.path.relpath(row.report, folder)))}">{name}</a>'
@@ -245,52 +245,64 @@ def _recordings(fleet: Fleet, folder: Path) -> str:
         by = " (time of the file)" if row.began and row.dated == "file" else ""
         verdict = (row.verdict or "failed").replace("_", " ")
         lines.append([date + by, name, text(verdict), text("; ".join(one for one in words if one))])
-    return table(("date (UTC)", "recording", "verdict", "why"), lines)
+    return table(("date (UTC)", "recording", "verdict", "why"), lines, cards=True)
 
 
 def _figure(fleet: Fleet) -> str:
-    """A panel for each parameter: value and error without scale over the date."""
-    parameters = _by_parameter(fleet)
+    """A picture for each parameter: value and error without scale over the date."""
     boards = list(dict.fromkeys(one.board for one in fleet.series))
     changed = list(dict.fromkeys(series.board for series, _ in fleet.changes(alarms=True)))
     colored = (boards if len(boards) <= _MOST_COLORS else changed)[:_MOST_COLORS]
-    colors = dict(zip(colored, _COLORS, strict=False))
-    inches = 0.6 + _PANEL_INCHES * -(-len(parameters) // 2) + 0.25 * -(-len(colors) // 2)
-    caption = (
-        "Each parameter of each board, with one standard error by noise and what the equations lack. Open: a recording "
-        f"with a warning.{'' if len(boards) <= _MOST_COLORS else ' Grey: boards without an alarm.'}"
+    colors = dict(zip(colored, map(to_hex, _COLORS), strict=False))
+    keys = "".join(
+        f'<span class="key" style="color:{color}">● {text(board)}</span> ' for board, color in colors.items()
     )
-    return picture(lambda figure: _drawn(figure, fleet, parameters, colors), inches, caption, "fleet")
-
-
-def _drawn(figure: Figure, fleet: Fleet, parameters: Mapping[str, Sequence[Series]], colors: Mapping[str, str]) -> None:
-    count = len(parameters)
-    panels = figure.subplots(-(-count // 2), min(2, count), sharex=True, squeeze=False).ravel()
     warned = {(row.board, row.began) for row in fleet.rows if row.warning is not None}
-    for panel, (name, own) in zip(panels, parameters.items(), strict=False):
-        unit, scale = _scale(own)
-        for one in sorted(own, key=lambda one: one.board in colors):
-            color = colors.get(one.board, of.QUIET)
-            style: Any = {"color": color, "markersize": 4, "linewidth": 0.8, "capsize": 2, "elinewidth": 0.6}
-            dates = [datetime.fromtimestamp(at, UTC) for at in one.t]
-            faces = ["none" if (one.board, float(at)) in warned else color for at in one.t]
-            panel.errorbar(dates, one.value / scale, one.apart / scale, fmt="-", **style, zorder=2)
-            panel.scatter(dates, one.value / scale, s=16, facecolors=faces, edgecolors=color, zorder=3)
-        panel.set_title(f"{name} [{unit}]" if unit else name, loc="left", fontsize="medium")
-        panel.ticklabel_format(axis="y", useOffset=False)
-        panel.grid(alpha=0.3)
-        locator = AutoDateLocator(maxticks=6)  # type: ignore[no-untyped-call]
-        panel.xaxis.set_major_locator(locator)
-        panel.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
     began = [float(at) for one in fleet.series for at in one.t]
-    if max(began) - min(began) < _SHORTEST:  # else the axis has no dates
-        panels[0].set_xlim(*(datetime.fromtimestamp(at, UTC) for at in (min(began) - _DAY / 2, max(began) + _DAY / 2)))
-    for panel in panels[count:]:
-        panel.set_visible(False)
-    if colors:
-        handles = [figure.gca().plot([], [], "o-", color=color)[0] for color in colors.values()]
-        labels = [board if len(board) <= _LONGEST else f"...{board[-_LONGEST:]}" for board in colors]
-        figure.legend(handles, labels, loc="outside upper left", ncols=2, fontsize="small")
+    spread = max(began) - min(began)
+    margin = spread / 20 if spread >= _SHORTEST else _DAY / 2  # else the axis has no dates
+    dates = (_day(min(began) - margin), _day(max(began) + margin))
+    draw = partial(_drawn, colors=colors, warned=warned, dates=dates)
+    pictures = [
+        picture(partial(draw, name=name, own=own), _PANEL[1], "", f"fleet-{k}", _PANEL[0])
+        for k, (name, own) in enumerate(_by_parameter(fleet).items())
+    ]
+    return (
+        f'<p>{keys}</p><div class="multiples">{"".join(pictures)}</div><p class="quiet">Each parameter of each board, '
+        "with one standard error by noise and what the equations lack. Open: a recording with a warning."
+        f"{'' if len(boards) <= _MOST_COLORS else ' Grey: boards without an alarm.'}</p>"
+    )
+
+
+def _drawn(
+    figure: Figure,
+    name: str,
+    own: Sequence[Series],
+    colors: Mapping[str, str],
+    warned: Set[tuple[str, float]],
+    dates: tuple[float, float],
+) -> None:
+    panel = figure.subplots()
+    unit, scale = _scale(own)
+    for one in sorted(own, key=lambda one: one.board in colors):
+        color = colors.get(one.board, of.QUIET)
+        style: Any = {"color": color, "markersize": 4, "linewidth": 0.8, "capsize": 2, "elinewidth": 0.6}
+        at_dates = [_day(float(at)) for at in one.t]
+        faces = ["none" if (one.board, float(at)) in warned else color for at in one.t]
+        panel.errorbar(at_dates, one.value / scale, one.apart / scale, fmt="-", **style, zorder=2)
+        panel.scatter(at_dates, one.value / scale, s=16, facecolors=faces, edgecolors=color, zorder=3)
+    panel.set_title(f"{name} [{unit}]" if unit else name, loc="left", fontsize="medium")
+    panel.set_xlim(*dates)
+    panel.ticklabel_format(axis="y", useOffset=False)
+    panel.grid(alpha=0.3)
+    locator = AutoDateLocator(maxticks=6)  # type: ignore[no-untyped-call]
+    panel.xaxis.set_major_locator(locator)
+    panel.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
+
+
+def _day(seconds: float) -> float:
+    """As axes have it."""
+    return seconds / _DAY
 
 
 def _short(boards: Sequence[str]) -> dict[str, str]:

@@ -133,7 +133,7 @@ def to_type(answer: Analysis) -> Iterator[str]:
             options.append(f"--add {shlex.quote(one.typed.format(a=next(names)))}")
     if options:
         yield f"identify with what is named: {' '.join(options)}"
-    for text in without:
+    for text in without if any(one.alarm for one in answer.doubts) else ():
         yield (
             f"a model file has no term for this: {text}; correct the column before the identification, or keep the "
             "motion where it does not matter"

@@ -108,7 +108,7 @@ class Answer(ABC):
     verdict : what they may be used for
     identified : whether there is a value
     identifier : which one it is: form and arithmetic
-    lines : what is said of it below the values
+    lines, method : what is said of it below the values, and in words of the method
     advice : sentences with what to type, where a column seems to be wrong
     """
 
@@ -130,8 +130,13 @@ class Answer(ABC):
     def identifier(self) -> str: ...
 
     @property
+    def lines(self) -> list[str]:
+        """None, unless there is a prediction."""
+        return []
+
+    @property
     @abstractmethod
-    def lines(self) -> list[str]: ...
+    def method(self) -> list[str]: ...
 
     @property
     def status(self) -> str:
@@ -298,20 +303,23 @@ class Analysis(Answer):
 
     @property
     def lines(self) -> list[str]:
-        """Residuals, the refinement, and the prediction."""
+        """The prediction."""
+        return [f"predicts motion that was not fitted: {listed(self.prediction)}"] if self.prediction else []
+
+    @property
+    def method(self) -> list[str]:
+        """Residuals, and the refinement."""
         found = self.found
         explained = ", ".join(f"{name} {part_of_one(value, 6)}" for name, value in found.r2.items())
         of_weak = "" if self.stage == "weak form" else "weak form: "
         lines = [
-            f"verdict {found.verdict.word}; {of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "
+            f"{of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "
             f"{found.design.window_s:.3g} s; R^2 {explained}"
         ]
         if self.refinement is not None:
             extras = self.refinement.fit.extras if self.refinement.fit is not None and self.refinement.adopted else {}
             shown = [f"{name} {value:.3g} ± {se:.1g}" for name, (value, se) in extras.items()]
             lines.append("; ".join([self.refinement.text, *([", ".join(shown)] if shown else [])]))
-        if self.prediction:
-            lines.append(f"predicts motion that was not fitted: {listed(self.prediction)}")
         return lines
 
     @property

@@ -165,11 +165,11 @@ class CoreAnswer(Answer):
         return f"weak form, C in {CORES[self.core].words}"
 
     @property
-    def lines(self) -> list[str]:
+    def method(self) -> list[str]:
         """Its last window, and the hash."""
         misfit = "not judged" if self.misfit is None else f"{self.misfit:.2g}"
         return [
-            f"verdict {self.verdict.word}; last window: {self.reason.text}; {self.standing}; chi2 {misfit}; "
+            f"last window: {self.reason.text}; {self.standing}; chi2 {misfit}; "
             f"{self.windows} windows of {2 * self.hop_s:.3g} s; hash {self.hash:08x}"
         ]
 

@@ -159,7 +159,7 @@ class RefinedCoreAnswer(Answer):
         return f"{'refined' if self.adopted else 'weak form'}, C in {FLOAT.words}"
 
     @property
-    def lines(self) -> list[str]:
+    def method(self) -> list[str]:
         """Which estimate it is, and the hash."""
         return [f"{self.text}; hash of both stages {self.hash:08x}"]
 

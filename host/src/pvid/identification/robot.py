@@ -183,14 +183,18 @@ class RobotAnswer(Answer):
         return told
 
     @property
+    def method(self) -> list[str]:
+        """Windows and rates."""
+        design = self.fit.design
+        return [f"{self.fit.windows} windows of {design.functions.length:.3g} s; rates over {design.taps} samples"]
+
+    @property
     def lines(self) -> list[str]:
-        """Windows, combinations, and the prediction."""
-        chain, design = self.model.chain, self.fit.design
+        """Combinations, and the prediction."""
+        chain = self.model.chain
         assert chain is not None
         combined = [one for one in chain.base if len(one.parts) > 1]
         lines = [
-            f"verdict {self.verdict.word}; {self.fit.windows} windows of {design.functions.length:.3g} s; rates over "
-            f"{design.taps} samples",
             *(f"{chain.name_of(one)} = {chain.closed_form(one)}" for one in combined),
             *self.impossible,
         ]

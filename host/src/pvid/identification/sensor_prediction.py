@@ -32,8 +32,15 @@ class SensorPrediction:
         """Part of the motion that is predicted."""
         return 1.0 - self.of_motion**2
 
+    @property
+    def times_noise(self) -> str:
+        """The difference over the noise; "": the noise is not known."""
+        return (
+            "" if self.of_noise is None else f"{self.of_noise:.2g}" if self.of_noise < 100 else f"{self.of_noise:.0f}"
+        )
+
     def __str__(self) -> str:
-        noise = "" if self.of_noise is None else f", {self.of_noise:.2g} times the sensor's noise"
+        noise = f", {self.times_noise} times the sensor's noise" if self.times_noise else ""
         rms = with_unit(self.rms, self.unit, 2)
         return (
             f"{self.name} to {percent(self.of_motion)} of its motion (rms {rms}{noise}; R^2 {part_of_one(self.r2, 5)})"

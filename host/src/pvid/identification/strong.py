@@ -81,14 +81,11 @@ class StrongAnswer(Answer):
         return f"strong form, {'float64' if core is None else f'C in {core.words}'}"
 
     @property
-    def lines(self) -> list[str]:
+    def method(self) -> list[str]:
         """The differentiators, and the end of the core's run."""
         config = self.design.config
         ends = "" if self.hash is None or self.reason is None else f"; {self.reason.text}; hash {self.hash:08x}"
-        return [
-            f"verdict {self.verdict.word}; derivatives over {config.window} samples, "
-            f"{config.window / config.sample_rate:.3g} s{ends}"
-        ]
+        return [f"derivatives over {config.window} samples, {config.window / config.sample_rate:.3g} s{ends}"]
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""

@@ -108,6 +108,15 @@ def printed_unit(unit: str) -> str:
     return re.sub(r"\^(-?\d+)", lambda power: raised(int(power[1])), whole)
 
 
+def unit_for(largest: float, unit: str) -> tuple[str, float]:
+    """The unit in which numbers up to `largest` have few zeros, as books print it, and its size."""
+    unit, scale = prefixed(largest, unit)
+    power = math.floor(math.log10(largest / scale)) if 0 < largest < math.inf else 0
+    if _POWERS[0] <= power <= _POWERS[1]:
+        return printed_unit(unit), scale
+    return f"×10{raised(power)} {printed_unit(unit)}".strip(), scale * 10.0**power
+
+
 class WithInterval(Protocol):
     """A value of an answer, or a parameter of a result."""
 

@@ -50,10 +50,13 @@ _IRREGULAR = 0.3  # scatter of the blank stretches, of their mean
 _EVEN = 0.1  # scatter of the steps from row to row, of their mean
 _BLANK = 0.9  # share of the rows in which what is set is blank
 _EPOCH = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))  # of seconds they are 1.7e9 now
+_BETWEEN = 0.01  # of the samples in the middle of the range: a counter passes it, what is switched does not
 _OF_MOTION = 0.99  # share of a signal's power
 _SPECTRUM = 1 << 17  # samples
 _SI = ("rad", "m", "s", "rad/s", "m/s", "V", "A", "N", "N*m", "K", "Hz", "W", "Pa", "kg", "m/s^2", "rad/s^2")
 _OFTEN_OTHER = {"rad/s": ("rpm", 0.0), "rad": ("deg", 3.2)}  # another usual unit, and numbers above which it can be
+_PHASES = {"V": "UW", "A": "BC"}  # of a machine, by letters that are also units
+_NO_NUMBERS = re.compile(r" has 0 rows of data|('.*') is not a number; (\d+) of \2 lines")
 _CONFLICTING = frozenset("m s a k n v h d g c w j t f l in min".split())  # also words of names
 
 
@@ -144,12 +147,16 @@ def names_in(path: Path) -> tuple[str, ...]:
     raise AssertionError("a column of nobody's name")
 
 
-def unit_of_name(name: str) -> str:
-    """The unit at the end of a column's name, where it is one beyond doubt: `angle_deg`, `h (mm)`; else ""."""
-    in_brackets = name.rstrip().endswith((")", "]"))
+def unit_of_name(name: str, names: Sequence[str] = ()) -> str:
+    """The unit at the end of a column's name, where it is one beyond doubt: `angle_deg`, `h (mm)`; else "".
+
+    names : of all columns: `ref_V` is in V unless there is a phase `ref_U`
+    """
+    sure = name.rstrip().endswith((")", "]"))
+    sure |= not {name[:-1] + phase for phase in _PHASES.get(name[-1:], name[-1:])} & {*names, name}
     for si in _SI:
         found = unit_in(name, si)
-        if found is not None and (in_brackets or found.lower() not in _CONFLICTING):
+        if found is not None and (sure or found.lower() not in _CONFLICTING):
             return found
     return ""
 
@@ -164,7 +171,7 @@ def _with_time(path: Path, names: tuple[str, ...], at: int) -> Survey:
         if key in read.unread:
             facts.append(ColumnFacts(key, names[k], "", np.nan, np.nan, None, None, (read.unread[key],)))
         else:
-            unit = read.stated.get(key) or unit_of_name(names[k])
+            unit = read.stated.get(key) or unit_of_name(names[k], names)
             facts.append(_facts_of(names[k], unit, read.table.signals[key], read.recording, key))
     time = f"t={typed(names, at)}" + (f":{read.time_unit}" if read.time_unit else "")
     return Survey(path, names, at, "t" if time == "t=t" else time, read.recording, tuple(facts))
@@ -208,7 +215,7 @@ def _read(path: Path, names: Sequence[str], at: int, others: Sequence[int]) -> _
             reading([k])
             readable.append(k)
         except PvidError as error:
-            unread[str(k + 1)] = _without_place(str(error), path, names[k])
+            unread[str(k + 1)] = _without_place(error, path, names[k])
     if not readable:
         raise refusal
     return replace(reading(readable), unread=unread)
@@ -234,9 +241,11 @@ def _has_changes_alone(values: Float) -> bool:
     return not steps.size or bool(steps.mean() > LONG_BLANK_ROWS or steps.std() > _IRREGULAR * steps.mean())
 
 
-def _without_place(sentence: str, path: Path, name: str) -> str:
+def _without_place(error: PvidError, path: Path, name: str) -> str:
     """A refusal without the file and the column, which stand beside it."""
-    return sentence.replace(f"{path}, ", "").replace(f"column {name}: ", "").rstrip(".")
+    if found := _NO_NUMBERS.search(str(error)):
+        return "no numbers" + (f", as in {found[1]}" if found[1] else "")
+    return str(error).replace(f"{path}, ", "").replace(f"column {name}: ", "").rstrip(".")
 
 
 def _facts_of(name: str, unit: str, written: Float, recording: Recording, key: str) -> ColumnFacts:
@@ -248,7 +257,8 @@ def _facts_of(name: str, unit: str, written: Float, recording: Recording, key: s
     remarks = []
     signal = recording.signals[key]
     counter = counted_on(signal, 1.0)
-    if counter is not None:
+    between = np.mean(np.abs(x - (low + high) / 2) < (high - low) / 4)
+    if counter is not None and between > _BETWEEN:
         remarks.append(f"a counter: it starts over after {counter.modulus:.10g}")
         signal, x = counter.values, counter.values[np.isfinite(counter.values)]
     blank = 1 - len(x) / len(written)
@@ -372,7 +382,7 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
     doubts: list[str] = []
     parts = [] if survey.time == "t" else [survey.time]
     for signal, name in own.items():
-        unit = unit_in(name, units[signal]) or unit_of_name(name)
+        unit = unit_in(name, units[signal]) or unit_of_name(name, survey.names)
         written = typed(survey.names, survey.names.index(name))
         in_si = not unit or scale_to(units[signal], unit) == Scale()
         other, largest = _OFTEN_OTHER.get(units[signal], ("", np.inf))

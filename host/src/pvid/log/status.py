@@ -75,5 +75,5 @@ class StatusLine:
             numbers = zip(self._mechanism.parameters[: hello.n_p], p, strict=False)
             values = ", ".join(f"{one.name} {value:.5g} {one.unit}".rstrip() for one, value in numbers)
             reason = Reason(estimate.reason).text if estimate.reason in list(Reason) else str(estimate.reason)
-            text += f"; tick {self._tick}: {values}, {'refined; weak form: ' if is_refined else ''}{reason}"
+            text += f"; tick {self._tick}: {values}, {'refined; first stage: ' if is_refined else ''}{reason}"
         return text

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from contextlib import suppress
 
 from pvid.base.errors import PvidError
 from pvid.link.frames import Code, Core, Form, Hello, Names, Status
 from pvid.log.mechanism import mechanism_named
 from pvid.log.reader import Account
+from pvid.settings.cores import CORES
 from pvid.settings.enums import Doubt, Reason, Stage
 from pvid.settings.forms import FORMS
 
@@ -61,8 +63,8 @@ def stage_words(stage: str, reason: str) -> str:
         return ""
     words = reason_words(reason).removeprefix("refinement: ")
     if stage == Stage.REFINED.text:
-        return "the refined one" + (f"; of the last block: {words}" if reason != Reason.UPDATED.text else "")
-    return f"the weak form's; the refinement: {words}"
+        return "the second stage's" + (f"; of the last block: {words}" if reason != Reason.UPDATED.text else "")
+    return f"the first stage's; the second: {words}"
 
 
 def board_words(hello: Hello | None, account: Account) -> str:
@@ -73,8 +75,9 @@ def board_words(hello: Hello | None, account: Account) -> str:
         kinds(number).name.lower() if number in list(kinds) else str(number)
         for kinds, number in ((Form, hello.form), (Core, hello.core))
     )
-    of = f"weak form of {_mechanism(account)}" if hello.form == Form.WEAK else f"{form} form"
-    text = f"{hello.board}: {of}, core {core}, {hello.sample_rate:g} samples per second"
+    of = _mechanism(account) if hello.form == Form.WEAK else f"{form} form"
+    arithmetic = CORES[core].words if core in CORES else core
+    text = f"{hello.board}: {of}, {arithmetic}, {hello.sample_rate:g} samples per second"
     status = account.lasting.get(Status)
     if isinstance(status, Status) and status.code != Code.RUNNING and status.code in list(Code):
         text += f"; {Code(status.code).name.lower().replace('_', ' ')}"
@@ -97,15 +100,15 @@ def link_words(account: Account) -> tuple[bool, str]:
     last = account.segments[-1]
     if last.why is None:
         return True, f"up, segment {last.number}"
+    if not account.obstacle and re.search("^ended|are over$|have come$", last.why):
+        return True, f"finished: {last.why}"
     return False, f"down: {account.obstacle or last.why}"
 
 
 def received_words(account: Account, samples: float, received: float) -> str:
     """What came, and `samples` and `received` bytes a second."""
-    return (
-        f"{account.samples} samples ({samples:.0f} per second), {account.bytes / 1e6:.2f} MB "
-        f"({received / 1e3:.1f} kB/s)"
-    )
+    rates = (f" ({samples:.0f} per second)", f" ({received / 1e3:.1f} kB/s)") if received else ("", "")
+    return f"{account.samples} samples{rates[0]}, {account.bytes / 1e6:.2f} MB{rates[1]}"
 
 
 def loss_words(account: Account) -> str:

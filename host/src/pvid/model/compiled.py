@@ -293,6 +293,7 @@ class CompiledModel:
     drift_s : time constant of what the rows tell along them [s]
     anchors : unknowns of drifts that are in no equation -> standard deviation of their start, all that is known of them
     chain : of a robot, which has no rows and equations: p are its base parameters
+    meanings : of parameters, in a few words, for those who read a report
     """
 
     name: str
@@ -314,6 +315,7 @@ class CompiledModel:
     drift_s: float = 0.0
     anchors: Mapping[sp.Symbol, float] = field(default_factory=dict)
     chain: Chain | None = None
+    meanings: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def alone(self) -> CompiledModel:

@@ -43,6 +43,7 @@ class Model:
         self.unknowns: list[Unknown] = []
         self.knowns: list[Known] = []
         self.outputs: list[Output] = []
+        self.meanings: dict[str, str] = {}
         self.hidden: list[Jet] = []
         self.defined: dict[Jet, sp.Expr] = {}
         self.equations: list[Equation] = []
@@ -233,6 +234,14 @@ class Model:
         if found is not None and found != wanted:
             raise self._refused(f"the output {name} has the unit {found}, not {unit or 1}")
         self.outputs.append(Output(name, unit, value))
+
+    def words(self, **meanings: str) -> None:
+        """What parameters are, in a few words for a report: words(R="resistance of the winding")."""
+        known = {one.name for some in (self.unknowns, self.outputs, self.knowns, self._extras) for one in some}
+        for name, meaning in meanings.items():
+            if name not in known:
+                raise self._refused(f"words: {name} is no parameter that is declared above")
+            self.meanings[name] = _plain(meaning)
 
     # ---- equations
 
@@ -500,6 +509,7 @@ class Model:
             drifts=tuple(tuple(one.get(p.symbol, sp.Integer(0)) for p in self.unknowns) for one in self.drifts),
             drift_s=self.drift_s,
             anchors=anchors,
+            meanings=dict(self.meanings),
         )
 
     @staticmethod

@@ -137,7 +137,7 @@ def find(lines: Sequence[str], wanted: Sequence[str], positions: Sequence[int] =
     stamped = _is_stamped(lines)
     bare = [without_stamp(line)[0] for line in lines] if stamped else lines
     sought = [one for one in wanted if not (stamped and one in ("t", STAMP))]
-    found: list[tuple[tuple[bool, float], Layout]] = []
+    found: list[tuple[tuple[bool, float, int], Layout]] = []
     named = cache(lambda: _named(bare, sought))
     for separator in SEPARATORS:
         table = _table(bare, separator, sought, [one - int(stamped) for one in positions], named)
@@ -145,6 +145,9 @@ def find(lines: Sequence[str], wanted: Sequence[str], positions: Sequence[int] =
             found.append(table)
     if not found:
         return None
+    by_tabs = next(((head, width) for (head, _, width), one in found if one.separator == "\t"), (False, 0))
+    # a row whose last cells are blank has fewer cells between blanks, and as many between tabs
+    found = [one for one in found if one[1].separator != " " or (one[0][0], one[0][2]) > by_tabs]
     layout = max(found, key=lambda one: one[0])[1]
     if stamped:
         stamp = STAMP if "t" in layout.names else "t"
@@ -166,8 +169,8 @@ def _table(
     wanted: Sequence[str],
     positions: Sequence[int],
     named: Callable[[], Sequence[int]],
-) -> tuple[tuple[bool, float], Layout] | None:
-    """The layout if this is the separator, and how well it fits; None where it divides nothing.
+) -> tuple[tuple[bool, float, int], Layout] | None:
+    """The layout if this is the separator, how well it fits, and the cells of a row; None where it divides nothing.
 
     named : as `_named`, for a header behind the first lines
     """
@@ -182,18 +185,20 @@ def _table(
     labelled = _labels(after if head is None else [])
     if labelled is not None:
         names, first = labelled
-        return (True, float(len(names))), Layout(separator, names, body=first, width=len(names), labelled=True)
+        return (True, float(len(names)), len(names)), Layout(
+            separator, names, body=first, width=len(names), labelled=True
+        )
     rows = [one for one in after if not one.is_comment and len(one.cells) > 1 and _has_number(one)]
     if not rows:
         if head is None or len(head[1]) < 2:
             return None
         names, number = tuple(head[1]), head[0].number
-        return (True, 0.0), Layout(separator, names, header=number, body=number + 1, width=len(names))
+        return (True, 0.0, len(names)), Layout(separator, names, header=number, body=number + 1, width=len(names))
     width = Counter(len(one.cells) for one in rows).most_common(1)[0][0]
     usual = [one for one in rows if len(one.cells) == width]
     numeric = sum(sum(kind in "nt" for kind in one.kinds) for one in usual) / len(rows)
     layout = _with_head(separator, sampled, usual, head, (wanted, positions))
-    return (head is not None, numeric**2 / width), layout
+    return (head is not None, numeric**2 / width, width), layout
 
 
 def _named(lines: Sequence[str], wanted: Sequence[str]) -> list[int]:

@@ -38,8 +38,16 @@ code { padding: .1rem .3rem; } pre { padding: .7rem; white-space: pre-wrap; over
 li { margin: .4rem 0; } ul { padding-left: 1.2rem; }
 .bar { display: flex; width: 9rem; height: .8rem; margin-top: .4rem; background: var(--line); }
 .bar > * { display: block; height: 100%; print-color-adjust: exact; -webkit-print-color-adjust: exact; }
+.broad { max-width: 84rem; } .broad p { max-width: 50rem; }
+.key { display: inline-block; font-weight: 600; margin-right: 1.2rem; }
+.multiples { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(19rem, 100%), 1fr)); gap: 0 1rem; }
+.multiples figure { margin: .3rem 0; } .multiples svg { min-width: 0; }
 @media (max-width: 32rem) { main { padding: 1rem .8rem 3rem; } td, th { padding-right: .7rem; }
-  td.number { white-space: normal; } .bar { width: 4.5rem; } }
+  td.number { white-space: normal; } .bar { width: 4.5rem; } .cards th { display: none; }
+  .cards, .cards tbody { display: block; }
+  .cards td { display: block; border: 0; padding: .1rem 0; } .cards tr { display: block; padding: .4rem 0;
+    border-bottom: 1px solid var(--line); } .cards td::before { content: attr(data-head) " "; color: var(--quiet); }
+  .cards td:empty { display: none; } }
 @page { margin: 16mm; }
 @media print { :root { color-scheme: light; } body { font-size: 10.5pt; }
   main { max-width: none; padding: 0; } figure, tr, li, pre { break-inside: avoid; }
@@ -55,18 +63,21 @@ def text(of_anybody: object) -> str:
     return escape(in_utf8(printable(str(of_anybody))))
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: int = 0) -> str:
-    """Of cells in HTML; the last `numbers` of each row do not wrap."""
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: int = 0, cards: bool = False) -> str:
+    """Of cells in HTML; the last `numbers` of each row do not wrap; cards: on a telephone each row is a list."""
     first = f"<tr>{''.join(f'<th>{one}</th>' for one in heads)}</tr>" if heads else ""
-    lines = [
-        "".join(f"<td{' class=number' if k >= len(row) - numbers else ''}>{cell}</td>" for k, cell in enumerate(row))
-        for row in rows
-    ]
-    return f'<div class="wide"><table>{first}{"".join(f"<tr>{one}</tr>" for one in lines)}</table></div>'
+
+    def cell(k: int, of: int, content: str) -> str:
+        head = f' data-head="{heads[k]}"' if cards else ""
+        return f"<td{' class=number' if k >= of - numbers else ''}{head}>{content}</td>"
+
+    lines = ["".join(cell(k, len(row), content) for k, content in enumerate(row)) for row in rows]
+    kind = ' class="cards"' if cards else ""
+    return f'<div class="wide"><table{kind}>{first}{"".join(f"<tr>{one}</tr>" for one in lines)}</table></div>'
 
 
-def picture(draw: Callable[[Figure], None], height: float, caption: str, name: str) -> str:
-    """A figure of that height [inches] with a caption in HTML; its colours follow those of the page.
+def picture(draw: Callable[[Figure], None], height: float, caption: str, name: str, width: float = of.WIDTH) -> str:
+    """A figure of that size [inches] with a caption in HTML; its colours follow those of the page.
 
     Parameters
     ----------
@@ -77,7 +88,7 @@ def picture(draw: Callable[[Figure], None], height: float, caption: str, name: s
     settings |= {"axes.edgecolor": of.QUIET, "axes.facecolor": "none", "legend.frameon": False}
     drawn = io.StringIO()
     with rc_context(settings):
-        figure = Figure(figsize=(of.WIDTH, height), layout="constrained")
+        figure = Figure(figsize=(width, height), layout="constrained")
         figure.patch.set_alpha(0.0)
         draw(figure)
         figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
@@ -88,11 +99,12 @@ def picture(draw: Callable[[Figure], None], height: float, caption: str, name: s
     for color, variable in _COLORS.items():
         svg = svg.replace(color, f"var(--{variable})")
     svg = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 system-ui, sans-serif", svg)
+    below = f"<figcaption>{caption}</figcaption>" if caption else ""
     label = escape(re.sub("<.*?>", "", caption))
-    return f'<figure role="img" aria-label="{label}">{svg}<figcaption>{caption}</figcaption></figure>'
+    return f'<figure role="img" aria-label="{label}">{svg}{below}</figure>'
 
 
-def document(title: str, body: str, *, refresh: int = 0) -> str:
+def document(title: str, body: str, *, refresh: int = 0, broad: bool = False) -> str:
     """The whole page.
 
     Parameters
@@ -100,7 +112,9 @@ def document(title: str, body: str, *, refresh: int = 0) -> str:
     title : text, of anybody
     body : in HTML
     refresh : seconds after which a browser loads it again; 0: never
+    broad : it has columns for a wide screen
     """
+    kind = ' class="broad"' if broad else ""
     again = f'<meta http-equiv="refresh" content="{refresh}">' if refresh else ""
     head = (
         f'<meta charset="utf-8"><meta name="generator" content="{CREATOR}">'
@@ -108,4 +122,4 @@ def document(title: str, body: str, *, refresh: int = 0) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<meta name="color-scheme" content="light dark">{again}<title>{text(title)}</title><style>{STYLE}</style>'
     )
-    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body><main>{body}</main></body></html>\n'
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body><main{kind}>{body}</main></body></html>\n'

@@ -53,7 +53,7 @@ def write_log_figure(log: Path, mechanism: LogMechanism, path: Path) -> bool:
     figure, grid = plt.subplots(rows, _COLUMNS, squeeze=False, figsize=(13, 1.5 + 1.9 * rows), layout="constrained")
     try:
         axes = list(grid.T.flat)
-        _estimates(history, axes, "weak form" if history.stage else "estimate", "C0", "C1")
+        _estimates(history, axes, "first stage" if history.stage else "estimate", "C0", "C1")
         rest = axes[len(drawn) :]
         _quality(history, rest[0], rest[1])
         seconds, *signals = history.samples()
@@ -133,7 +133,7 @@ def _quality(history: History, residual: Axes, kappa: Axes) -> None:
     residual.set_title(residual_words(history.hello), fontsize="small")
     shown = history.estimates("kappa")
     kappa.semilogy(t, np.where(shown > 0, shown, np.nan), color="C2")
-    kappa.set_ylabel(f"kappa of {history.mechanism.parameters[0].name}")
+    kappa.set_ylabel(f"excitation of {history.mechanism.parameters[0].name}")
 
 
 def _last(history: History) -> str:
@@ -145,5 +145,7 @@ def _last(history: History) -> str:
             value, error = with_error(newest[one.name], newest[f"{one.name}_se"])
             parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())
     words = reason_words(history.reason)
-    published = f"published: {stage_words(history.stage, history.refined_reason)}; weak form: " if history.stage else ""
+    published = (
+        f"published: {stage_words(history.stage, history.refined_reason)}; first stage: " if history.stage else ""
+    )
     return f"{', '.join(parts)} (± standard error); {published}{history.reason}{': ' if words else ''}{words}"

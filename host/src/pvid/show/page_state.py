@@ -16,6 +16,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.rounding import prefix_of, with_error
 from pvid.base.toml_text import toml_document
+from pvid.identification.summary import unit_for
 from pvid.link.names import Quantity
 from pvid.log.history import History, Rates, envelope
 from pvid.log.reader import LogStream
@@ -134,8 +135,9 @@ class LiveState(threading.Thread):
         for one in (*mechanism.answers, *self._history.extras):
             value = published.get(one.name, math.nan)
             if not math.isnan(value):
-                shown, spread = with_error(value, published[f"{one.name}_se"])
-                row = {"name": one.name, "unit": one.shown_unit, "value": shown, "error": f"± {spread}"}
+                unit, scale = unit_for(abs(value), one.unit)
+                shown, spread = with_error(value / scale, published[f"{one.name}_se"] / scale)
+                row = {"name": one.name, "unit": unit, "value": shown, "error": f"± {spread}"}
                 rows.append({**row, "large": one.name in large})
         if not self._history.is_physical:
             names = ", ".join(one.name for one in mechanism.outputs)
@@ -160,9 +162,11 @@ class LiveState(threading.Thread):
             stages = {"": (history.estimates(one.name), 2 * history.estimates(f"{one.name}_se"))}
             if history.stage:
                 stages["refined"] = self._at_estimates(one.name), 2 * self._at_estimates(f"{one.name}_se")
-            curve: dict[str, Any] = {"label": one.label}
+            newest = history.published.get(one.name, math.nan)
+            unit, scale = unit_for(abs(newest) if math.isfinite(newest) else 1.0, one.unit)
+            curve: dict[str, Any] = {"label": f"{one.name} [{unit}]" if unit else one.name}
             found = []
-            for stage, (value, band) in stages.items():
+            for stage, (value, band) in ((stage, (own[0] / scale, own[1] / scale)) for stage, own in stages.items()):
                 for name, x in (("value", value), ("low", value - band), ("high", value + band)):
                     curve[stage + name.title() if stage else name] = _numbers(x)
                 low, high = interesting(value, band)

@@ -75,7 +75,7 @@ def report(answer: Answer, made: Made, *, validation: Validation | None = None, 
         f"Report of {datetime.now(UTC):%d %B %Y}.</p>",
         f'<p><span class="badge {_CLASS[word]}">{told}</span> <strong>{text(meaning)}</strong></p>',
         *(f"<p>{text(one)}</p>" for one in sentences(answer)),
-        _values(answer.values) if answer.identified else "",
+        _values(answer.values, model.meanings) if answer.identified else "",
         *_missing(answer, made),
         *_against(answer, validation, name),
         *_notes(answer),
@@ -88,17 +88,19 @@ def report(answer: Answer, made: Made, *, validation: Validation | None = None, 
     return document(f"{model.title}: {files}", "".join(parts))
 
 
-def _values(values: Mapping[str, Value]) -> str:
-    """Each with its interval."""
+def _values(values: Mapping[str, Value], meanings: Mapping[str, str]) -> str:
+    """Each with what it is, and its interval."""
     rows = []
     for name, one in values.items():
+        meaning = meanings.get(name.partition("[")[0])
+        label = text(name) + (f'<br><span class="quiet">{text(meaning)}</span>' if meaning else "")
         told, word = shown(one), f'<span class="{_CLASS[one.word]}">{VERDICTS[one.word][0].lower()}</span>'
         if told is None:
-            rows.append([text(name), "not determined", text(one.reason or ""), word])
+            rows.append([label, "not determined", text(one.reason or ""), word])
             continue
         power = f" × 10<sup>{told.power}</sup>" if told.power else ""
         unit = f" {text(told.unit)}" if told.unit else ""
-        rows.append([text(name), f"{told.value}{power}{unit}", f"{told.low} to {told.high}{power}{unit}", word])
+        rows.append([label, f"{told.value}{power}{unit}", f"{told.low} to {told.high}{power}{unit}", word])
     heads = ["parameter", "value", "95 % interval", "verdict"]
     return table(heads, rows, numbers=3 if all(one.value is not None for one in values.values()) else 0)
 
@@ -165,8 +167,12 @@ _HEADS = ("sensor", "rms difference", "of the motion", "times the noise")
 
 def _row(one: SensorPrediction) -> list[str]:
     unit, scale = prefixed(one.rms, one.unit)
-    noise = "" if one.of_noise is None else f"{one.of_noise:.2g}" if one.of_noise < 100 else f"{one.of_noise:.0f}"
-    return [text(one.name), text(with_unit(one.rms / scale, printed_unit(unit), 2)), percent(one.of_motion), noise]
+    return [
+        text(one.name),
+        text(with_unit(one.rms / scale, printed_unit(unit), 2)),
+        percent(one.of_motion),
+        one.times_noise,
+    ]
 
 
 def _compared(answer: Answer, validation: Validation, key: str, how: str) -> Iterator[str]:
@@ -241,7 +247,9 @@ def _method(answer: Answer, made: Made) -> Iterator[str]:
     """Command, files, equations, settings, and the words of the method."""
     yield f"<pre>{text(made.command)}</pre>"
     yield f"<p>pvid {__version__}; {text(answer.identifier)}.</p><ul>"
-    yield "".join(f"<li>{text(line)}</li>" for line in (*answer.lines, *answer.recording.notes)) + "</ul>"
+    yield (
+        "".join(f"<li>{text(line)}</li>" for line in (*answer.method, *answer.lines, *answer.recording.notes)) + "</ul>"
+    )
     if made.files:
         rows = [[text(one), f"<code>{_digest(one)}</code>"] for one in made.files]
         yield table(["file", "SHA-256"], rows)

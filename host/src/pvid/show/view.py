@@ -138,7 +138,7 @@ class LiveView:
         filled = round(length * kappa_share(kappa))
         style = "green" if kappa >= KAPPA_WEAK else "yellow"
         bar = Text("█" * filled, style=style) + Text("░" * (length - filled), style="dim")
-        rows.add_row("kappa", bar + Text(f"  {kappa:.2g}  {kappa_words(kappa)}" if newest else "  none yet"))
+        rows.add_row("excited", bar + Text(f"  {kappa:.2g}  {kappa_words(kappa)}" if newest else "  none yet"))
         line = sparkline(history.estimates("residual"), length)
         rows.add_row(
             "residual",

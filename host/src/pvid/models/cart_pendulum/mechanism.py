@@ -12,3 +12,6 @@ b, Fc, bp = model.unknown("b", "N*s/m", 1.0), model.unknown("Fc", "N", 0.3), mod
 c, g = model.unknown("c", "rad", 0.0, positive=False, sd=0.5), model.known("g", "m/s^2", 9.81)
 T = mt * x.d() ** 2 / 2 + ml * cos(a - c) * x.d() * a.d() + J * a.d() ** 2 / 2
 model.lagrange(T + ml * g * cos(a - c), [x, a], [F - b * x.d() - Fc * sgn(x.d()), -bp * a.d()])
+model.words(mt="mass of cart and pendulum", ml="mass of the pendulum times its length")
+model.words(J="inertia of the pendulum about its joint", b="viscous friction of the cart")
+model.words(Fc="dry friction of the cart", bp="viscous friction of the joint", c="offset of the encoder")

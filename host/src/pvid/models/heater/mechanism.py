@@ -9,3 +9,4 @@ Ta = model.sensor("Ta", "K", resolution=0.0625, reach=500, driven=True, gain_sd=
 C, h = model.unknown("C", "J/K", 100.0), model.unknown("h", "W/K", 0.5)
 h2 = model.unknown("h2", "W/K^2", 1e-3)  # the loss grows with the difference: convection, radiation
 model.equation(C * T.d() + (h + h2 * (T - Ta)) * (T - Ta) - P)
+model.words(C="heat capacity", h="loss by temperature", h2="growth of the loss with temperature")

@@ -10,7 +10,7 @@ y = model.sensor("y", "m", resolution=5e-6, noise=0.4, reach=0.02, driven=True, 
 phi = model.sensor("phi", "rad", resolution=2 * pi / 2**14, reach=0.2, neglected=1.0)  # small angles
 u, x = model.define("u", "1/s^2", y.d(2) / l1), model.unmeasured("phi1", "rad")
 w, d1, d2 = model.unknown("w", "1/s^2", 9.501 / l1), model.unknown("d1", "", 8.875), model.unknown("d2", "", 5.625)
-c = model.unknown("c", "rad", 0.0, positive=False, sd=0.5)  # the encoder's zero
+c = model.unknown("c", "rad", 0.0, positive=False, sd=0.5)
 L2, G, f = d1 - d2 - 1, w + u, phi - c
 model.equation(x.d(2) + G * x - L2 * G * f)
 model.equation(phi.d(2) - G * x + (d1 - 1) * G * f)
@@ -30,3 +30,10 @@ first = a1.d(2) + lam * (cos(a2 - a1) * a2.d(2) - swing * a2.d() ** 2) + lift * 
 second = cos(a2 - a1) * a1.d(2) + (1 + sig) * lam * a2.d(2) + swing * v1**2 + lift * sin(a2) + push * cos(a2)
 first, second = first + k1 * v1 + f1 * sgn(v1) - joint, second + joint / lam
 model.refine([first, second], outputs={phi: a2 - a1 + c}, region=[L2 - 0.02])
+model.words(g="gravity", l2="distance of the rod's centre of mass from its joint", rho2="radius of gyration of the rod")
+model.words(
+    w="gravity over l1",
+    d1="first combination of the lengths",
+    d2="second combination of the lengths",
+    c="offset of the encoder",
+)

@@ -18,3 +18,6 @@ w, lost = pp * th.d(), 4 * V0 / (pi * sqrt(id_**2 + iq**2))  # the field's rate 
 model.equation(Ld * id_.d() + (R + lost) * id_ - w * Lq * iq - vd)
 model.equation(Lq * iq.d() + (R + lost) * iq + w * (Ld * id_ + psi) - vq)
 model.equation(J * th.d(2) + b * th.d() + Tc * sgn(th.d()) - 3 * pp / 2 * (psi * iq + (Ld - Lq) * id_ * iq))
+model.words(R="resistance of a winding", V0="voltage lost by dead time", Ld="inductance along the magnet")
+model.words(Lq="inductance across the magnet", psi="flux linkage of the magnet", J="inertia", b="viscous friction")
+model.words(Tc="dry friction")

@@ -12,3 +12,6 @@ Ixy, Ixz, Iyz = (model.unknown(f"I{n}", "kg*m^2", 0.0, positive=False, sd=2e-3) 
 inertia = Matrix([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
 for row in inertia * w.applyfunc(lambda one: one.d()) + w.cross(inertia * w) - torque:
     model.equation(row)
+model.words(Ixx="moment of inertia about x", Iyy="moment of inertia about y", Izz="moment of inertia about z")
+model.words(Ixy="element xy of the inertia tensor", Ixz="element xz of the inertia tensor")
+model.words(Iyz="element yz of the inertia tensor")

@@ -17,3 +17,7 @@ swing = I2 * (q1.d() + q2.d()) ** 2 / 2 + h2 * l1 * cos(q2) * q1.d() * (q1.d() +
 P = g * ((h1 + m2 * l1) * sin(q1) + h2 * sin(q1 + q2))
 forces = [t1 - v1 * q1.d() - c1 * sgn(q1.d()), t2 - v2 * q2.d() - c2 * sgn(q2.d())]
 model.lagrange((I1 + m2 * l1**2) * q1.d() ** 2 / 2 + swing - P, [q1, q2], forces)
+model.words(I1="inertia of the first link", I2="inertia of the second link")
+model.words(h1="mass times centre's distance, first link", h2="mass times centre's distance, second link")
+model.words(v1="viscous friction of the shoulder", v2="viscous friction of the elbow")
+model.words(c1="dry friction of the shoulder", c2="dry friction of the elbow")

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pvid.base.wording import with_unit
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.verdict import Reason
@@ -20,7 +21,10 @@ def of_scale(model: CompiledModel, by_gain: Mapping[str, Float], p: Float, se: F
         moved = np.abs(by_gain.get(signal.name, np.zeros(len(p)))) * _A_GAIN
         if signal.gain_sd == 0 and np.any(moved > 2 * se):
             k = int(np.argmax(moved / np.maximum(np.abs(p), 1e-300) * (moved > 2 * se)))
-            scales.append(f"{signal.name} ({100 * moved[k] / abs(p[k]):.2g} % of {model.p_names[k]})")
+            name, unit = model.p_names[k], model.unknowns[k].unit
+            size = f"{100 * moved[k] / abs(p[k]):.2g} % of {name}"
+            size = size if moved[k] < abs(p[k]) else f"{name} by {with_unit(float(moved[k]), unit, 2)}"
+            scales.append(f"{signal.name} ({size})")
     if not scales:
         return []
     text = "The standard errors include no gain error (gain_sd = 0). A gain error of 1 % changes the estimate: "

@@ -67,6 +67,13 @@ function tickText(value, log) {
   return Math.abs(value / 10 ** power - 1) < 1e-6 ? `1e${power}` : "";
 }
 
+// As wide as its longest label.
+function widthOfLabels(chart, all, k, cycle) {
+  if (cycle > 1) return chart.axes[k]._size;
+  chart.ctx.font = chart.axes[k].font[0];
+  return Math.ceil(12 + Math.max(20, ...(all ?? []).map((one) => chart.ctx.measureText(one).width / devicePixelRatio)));
+}
+
 function options(plot, canvas) {
   const { spec } = plot;
   return {
@@ -75,7 +82,7 @@ function options(plot, canvas) {
       x: { time: false, range: scaleOfTime(plot) },
       y: { range: scaleOfValue(plot), ...(spec.log ? { distr: 3 } : {}) },
     },
-    axes: [axis({ size: 28, space: 70 }), axis({ size: 62, values: (chart, all) => all.map((one) => tickText(one, spec.log)) })],
+    axes: [axis({ size: 28, space: 70 }), axis({ size: widthOfLabels, values: (chart, all) => all.map((one) => tickText(one, spec.log)) })],
     series: [{ label: "t [s]", value: digits }, ...spec.series.map(({ colour, ...one }) => ({ width: 1.5, points: { show: false }, value: digits, stroke: colour && color(colour), spanGaps: false, ...one }))],
     bands: (spec.bands ?? []).map((pair) => ({ series: pair, fill: color("band") })),
     cursor: { sync: { key: "time", scales: ["x", null] }, points: { size: 6 }, drag: { x: true, y: false } },
@@ -168,8 +175,8 @@ function drawPlots({ estimates, motion, marks: newest }) {
     draw({
       id: `parameter${i}`, section: "parameters", label: one.label, data: [t, one.value, one.low, one.high, ...refined], limits: one.limits, marked: true,
       series: [
-        { label: refined.length ? "weak form" : "estimate", colour: "blue", width: 2, paths: held }, ...edges,
-        ...(refined.length ? [{ label: "refined", colour: "orange", width: 2, paths: held }, ...edges] : []),
+        { label: refined.length ? "first stage" : "estimate", colour: "blue", width: 2, paths: held }, ...edges,
+        ...(refined.length ? [{ label: "second stage", colour: "orange", width: 2, paths: held }, ...edges] : []),
       ],
       bands: refined.length ? [[3, 2], [6, 5]] : [[3, 2]],
     });
@@ -189,9 +196,9 @@ function drawPlots({ estimates, motion, marks: newest }) {
     series: [{ label: "residual", colour: "orange" }],
   });
   draw({
-    id: "kappaPlot", section: "signals", label: "kappa: are the parameters identifiable?", log: true,
+    id: "kappaPlot", section: "signals", label: "excitation, 0 to 1", log: true,
     data: [t, estimates.kappa, t.map(() => NOTHING_BELOW)],
-    series: [{ label: "kappa", colour: "green" }, { label: "least that is published", colour: "red", dash: [6, 4] }],
+    series: [{ label: "excitation", colour: "green" }, { label: "limit", colour: "red", dash: [6, 4] }],
   });
 }
 
@@ -209,6 +216,8 @@ function drawWords(state) {
   say("title", state.title);
   say("board", state.board);
   say("link", state.link, state.up ? "good" : "bad");
+  document.querySelector("main").hidden = !state.motion.some((one) => one.t.length);
+  place("waiting").hidden = !document.querySelector("main").hidden;
   say("received", state.received);
   say("lost", state.lost || "nothing", state.lost ? "bad" : "good");
   say("reason", state.reason || "no estimate yet");
@@ -219,7 +228,7 @@ function drawWords(state) {
   say("stage", state.stage);
   say("kappa", state.kappa);
   say("residual", state.residual);
-  say("modelled", state.modelled || "not simulated yet", state.modelled ? "" : "quiet");
+  say("modelled", state.modelled || "none yet", state.modelled ? "" : "quiet");
   place("kappaShare").value = state.kappaShare;
   const large = state.parameters.filter((one) => one.large), small = state.parameters.filter((one) => !one.large);
   filled(place("tiles"), "tile", large.map((one) => [["span", one.name], ["b", one.value], ["span", `${one.error} ${one.unit}`]]));
