@@ -47,7 +47,7 @@ SLOW = """
     core/dropped_calls sim/rigs core/bad_config bench/longevity core/model_library core/equation_error tools/docs
     identification/wild_samples board/port cli/output tools/proofs log/untrusted
     show/pictures tools/loops oracle/strong_described tools/analysis codegen/random
-    bench/hard log/export log/text_table core/dead_zone tools/mutate bench/model_boards
+    board/block bench/hard log/export log/text_table core/dead_zone tools/mutate bench/model_boards
     deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
     design/differentiation identification/following codegen/fitted_sizes identification/gallery
     sim/pendulum oracle/weak_segments base/packages core/snapshot_weak oracle/failures rig/former_files oracle/zero

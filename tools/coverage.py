@@ -51,6 +51,7 @@ MECHANISMS = (
     *(f"tests/core/test_{name}_q31.py" for name in ("weak_snapshot", "weak_rows", "trust")),
     *(f"tests/core/test_{name}.py" for name in ("kinds", "kinds_q31", "refinement")),
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "renewal", "snapshot_weak")),
+    "tests/board/test_block.py",  # samples in blocks
     "tests/codegen/test_fitted_sizes.py",  # builds for one design
 )
 # A compiler that counts branches, but not those of a sanitizer; each call has a folder of its own, since objects of

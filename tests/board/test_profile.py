@@ -5,8 +5,8 @@ import pytest
 from bench.figures import results_of
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
-from pvid.board.profile import HEADER, Profile, profile, refined, table_rows
-from pvid.board.sizes import REFINED
+from pvid.board.profile import HEADER, Profile, in_blocks, profile, refined, table_rows
+from pvid.board.sizes import IN_BLOCKS, REFINED
 from pvid.settings.forms import FORMS
 
 BOARD = "mps2-an386"
@@ -15,10 +15,11 @@ MOST_OF_A_CALL = 12  # instructions of the main loop between the two readings: a
 
 @pytest.fixture(scope="module")
 def profiles() -> dict[str, Profile]:
-    return {**{form: profile(BOARDS[BOARD], form) for form in FORMS}, REFINED: refined(BOARDS[BOARD])}
+    board = BOARDS[BOARD]
+    return {**{form: profile(board, form) for form in FORMS}, REFINED: refined(board), IN_BLOCKS: in_blocks(board)}
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", (*FORMS, IN_BLOCKS))
 def test_the_functions_add_up_to_the_measured_mean(profiles: dict[str, Profile], form: str) -> None:
     one = profiles[form]
     assert 0 < one.measured - one.total < MOST_OF_A_CALL

@@ -13,11 +13,11 @@ from bench.figures import results_of
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31, sizes
 from pvid.board.boards import BOARDS, Board, run
-from pvid.board.replay_image import REPORT_EVERY, ReplayReport, parse_report, play
+from pvid.board.replay_image import BLOCK, REPORT_EVERY, ReplayReport, parse_report, play
 from pvid.board.strong_image import hashes_of, standard_run
 from pvid.board.weak_image import weak_image
 
-FORMS_AND_CORES = [*sizes.ALL, (sizes.REFINED, "f32")]
+FORMS_AND_CORES = [*sizes.ALL, (sizes.REFINED, "f32"), (sizes.IN_BLOCKS, "f32"), (sizes.IN_BLOCKS, "q31")]
 TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
 
 Measured = dict[sizes.Configuration, tuple[sizes.Footprint, ReplayReport]]
@@ -52,16 +52,22 @@ def expected_hashes(form: str, core: str) -> npt.NDArray[np.uint32]:
     compare it with the twin's."""
     if form == "strong":
         return hashes_of(standard_run("kapitza"))
+    if form == sizes.IN_BLOCKS and core == "q31":
+        fixed = mechanism_image_q31.fixed_run("kapitza", long=True)
+        return mechanism_image_q31.identifier_of(fixed).run_in_blocks(fixed.counts, BLOCK)
+    if form == sizes.IN_BLOCKS:
+        run = mechanism_image.mechanism_run("kapitza", long=True)
+        return mechanism_image.identifier_of(run).run_in_blocks(run.samples, BLOCK)
     if core == "q31":
         return mechanism_image_q31.native_hashes(mechanism_image_q31.fixed_run("kapitza", long=True))
     return mechanism_image.native_hashes(mechanism_image.mechanism_run("kapitza", long=True))
 
 
-def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -> None:
+def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32], every: int = 1) -> None:
+    """every: ticks of a block; the hash of a report's tick is that behind its block."""
     assert report.ticks == len(expected)
-    assert report.hashes == {
-        tick: int(expected[tick - 1]) for tick in range(REPORT_EVERY, report.ticks + 1, REPORT_EVERY)
-    }
+    ends = [-(-tick // every) * every for tick in range(REPORT_EVERY, report.ticks + 1, REPORT_EVERY)]
+    assert report.hashes == {end: int(expected[end - 1]) for end in ends}
     assert report.hash == int(expected[-1])
 
 
@@ -78,7 +84,7 @@ def test_every_board_computes_the_bits_of_the_host(
             if board.toolchain == "avr":  # which plays less of the run
                 assert report.ticks > 5000
                 expected = expected[: report.ticks]
-            assert_same_hashes(report, expected)
+            assert_same_hashes(report, expected, BLOCK if form == sizes.IN_BLOCKS else 1)
             boards.add(board.name)
     on_all = BOARDS if request.config.getoption("--long") else (*FEW, RISC_V)
     wanted = on_all if (form, core) == ON_ALL else FEW

@@ -78,6 +78,8 @@ def test_a_simulation_of_the_guess_is_replayed_in_the_core_that_is_asked_for(rig
     given = ("design", "--rig", rig, "--duration", "10", "--on", BOARD, "--json")
     (found,) = json.loads(pvid(*given, "--core", "q31").stdout)["cost"]
     assert found["core"] == "q31" and 0 < found["mean"] < found["longest"] and 0 < found["ticks"] <= 10_000
+    block = found["block"]
+    assert block["samples"] == 24 and block["mean"] < found["mean"] and found["longest"] < block["longest"]
 
 
 @pytest.mark.night

@@ -231,7 +231,7 @@ def test_the_costs_are_what_their_command_writes(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(sizes, "measure", lambda one: (budget[one], None))
     page = tmp_path / "README.md"
     page.write_text(re.sub(r"\| \d+ / \d+ \| \d+", "| 1 / 2 | 3", text_of(FIRMWARE)), encoding="utf-8")
-    assert text_of(page).count("| 1 / 2 | 3") == 6
+    assert text_of(page).count("| 1 / 2 | 3") == 7
     CliRunner().invoke(commands, ["sizes", "--update", str(page)], standalone_mode=False, catch_exceptions=False)
     assert text_of(page) == text_of(FIRMWARE), "./tools/pvid sizes --update host/docs/firmware.md"
 

@@ -33,6 +33,7 @@ WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 PRINTED = {
     "minimal": r"(?s).*: updated\n.*\nR = 1\.(19|20)\d* \+- \S+ ohm\n.*",
     "timer_and_main_loop": r"estimate 1 at tick \d+: R = 1\.(19|20)\d*\n(?s:.*)",
+    "dma_blocks": r"estimate 1 behind tick \d+: R = 1\.(19|20)\d*\n(?s:.*)",
     "own_mechanism": r"0\.0(199|200)\d .*\n0\.0(49|50)\d\d .*\n0\.(09|10)\d\d\d .*\n",
     "snapshot_in_flash": r"(\d+) estimates before the power cut, \1 after it; R = 1\.(19|20)\d*\n",
     "endless_rotation": r"2\d{3} turns, standing 1: R = 1\.(1999|2000|2001)\n",

@@ -237,9 +237,10 @@ static pvid_status init_weak(void)
 
 static pvid_reason step_weak(uint32_t kind, unsigned long tick)
 {
-    float sample[KAPITZA_WEAK_SAMPLES]; /* y, phi */
+    float sample[2 * KAPITZA_WEAK_SAMPLES]; /* y, phi */
     hostile_sample(kind, tick, &sample[1], &sample[0]);
-    return pvid_weak_step_f32(&weak.self, sample);
+    hostile_sample(kind, tick, &sample[3], &sample[2]);
+    return one_in(4) ? pvid_weak_step_block_f32(&weak.self, sample, 2) : pvid_weak_step_f32(&weak.self, sample);
 }
 
 static void gap_weak(void)
@@ -540,9 +541,11 @@ static pvid_reason step_weak_q31(uint32_t kind, unsigned long tick)
 {
     static const double lsb[2] = {3.835e-4, 5.0e-6};
     static const int32_t full_scale[2] = {782, 6000};
-    int32_t reading[KAPITZA_WEAK_SAMPLES]; /* y, phi */
+    int32_t reading[2 * KAPITZA_WEAK_SAMPLES]; /* y, phi */
     hostile_counts(kind, tick, lsb, full_scale, &reading[1], &reading[0]);
-    return pvid_weak_step_q31(&weak_q31.self, reading);
+    hostile_counts(kind, tick, lsb, full_scale, &reading[3], &reading[2]);
+    return one_in(4) ? pvid_weak_step_block_q31(&weak_q31.self, reading, 2)
+                     : pvid_weak_step_q31(&weak_q31.self, reading);
 }
 
 static void gap_weak_q31(void)

@@ -31,6 +31,8 @@ static void call_all(pvid_weak_f32 *one, pvid_weak_q31 *other)
         assert_int_equal(pvid_weak_step_f32(one, sample), PVID_NOT_READY);
         assert_int_equal(pvid_weak_step_q31(other, reading), PVID_NOT_READY);
     }
+    assert_int_equal(pvid_weak_step_block_f32(one, sample, 1), PVID_NOT_READY);
+    assert_int_equal(pvid_weak_step_block_q31(other, reading, 1), PVID_NOT_READY);
     pvid_weak_gap_f32(one);
     pvid_weak_gap_q31(other);
     pvid_weak_freeze_f32(one, true);
@@ -94,6 +96,8 @@ static void a_missing_reading_is_not_ready(void **state)
     assert_int_equal(pvid_weak_init_q31(&weak_q31, &kapitza_config_q31), PVID_OK);
     assert_int_equal(pvid_weak_step_f32(&weak, NULL), PVID_NOT_READY);
     assert_int_equal(pvid_weak_step_q31(&weak_q31, NULL), PVID_NOT_READY);
+    assert_int_equal(pvid_weak_step_block_f32(&weak, NULL, 1), PVID_NOT_READY);
+    assert_int_equal(pvid_weak_step_block_q31(&weak_q31, NULL, 1), PVID_NOT_READY);
 }
 
 static void init_refuses_null(void **state)

@@ -208,7 +208,7 @@ static void rows_have_the_moments_of_generalised_least_squares(void **state)
         ticks++;
     }
     while (self.estimator.counters.rows < FUNCTIONS) { /* all rows of the first window, and no stage behind them */
-        pvid_weak_finish_step_f32(&self);
+        pvid_weak_finish_run_f32(&self, 1);
     }
     double psi[5][2 * HOP]; /* what the functions, or for the last column their derivatives, multiply */
     for (int k = 0; k < 2 * HOP; k++) {
@@ -367,7 +367,7 @@ static void stages_are_as_many_as_counted(void **state)
         uint32_t stages = 0;
         pvid_weak_finish_begin_f32(&self.finish);
         while (self.finish.stage != PVID_WEAK_IDLE) {
-            pvid_weak_finish_step_f32(&self);
+            pvid_weak_finish_run_f32(&self, 1);
             stages++;
         }
         /* "at most" counts one stage too many for a column with terms, and one for nuisances */
@@ -437,7 +437,7 @@ static void estimates_do_not_depend_on_the_slices_of_the_schedule(void **state)
         }
         for (int tick = 0; tick < 2000; tick++) { /* what is in processing ends; no window is complete */
             if (self.finish.stage != PVID_WEAK_IDLE) {
-                pvid_weak_finish_step_f32(&self);
+                pvid_weak_finish_run_f32(&self, 1);
             }
         }
         memcpy(p[slow], self.estimator.p, sizeof p[slow]);

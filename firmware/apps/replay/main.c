@@ -22,6 +22,14 @@
 #define COUNT(tick, channel) (replay_samples[tick][channel])
 #endif
 
+/* Samples are given one by one, by a step of two arguments, or in blocks of REPLAY_BLOCK. */
+#if !defined(REPLAY_BLOCK)
+#define REPLAY_BLOCK 1u
+#define REPLAY_BLOCK_STEP(self, sample, ticks) REPLAY_STEP(self, sample)
+#else
+#define REPLAY_BLOCK_STEP REPLAY_STEP
+#endif
+
 static REPLAY_TYPE identifier;
 
 #if defined(REPLAY_HAS_BITS)
@@ -49,7 +57,7 @@ static REPLAY_SAMPLE sample_of(REPLAY_COUNT count, REPLAY_SAMPLE lsb)
 typedef struct {
     uint64_t total;   /* counts of pvid_port_instructions, from REPLAY_MEASURE_FROM on */
     uint32_t ticks;   /* counted in it */
-    uint32_t longest; /* of all ticks */
+    uint32_t longest; /* of all ticks, or blocks */
 } cost;
 
 /* Counts that measuring itself takes: two readings in a row. */
@@ -63,22 +71,25 @@ static uint32_t play(cost *whole)
 {
     uint32_t hash = PVID_FNV_START;
     const uint32_t reading = overhead();
-    for (uint32_t tick = 0; tick < REPLAY_TICKS; tick++) {
-        REPLAY_SAMPLE sample[REPLAY_CHANNELS];
-        for (uint32_t channel = 0; channel < REPLAY_CHANNELS; channel++) {
-            sample[channel] = sample_of(COUNT(tick, channel), replay_lsb[channel]);
+    uint32_t ticks = REPLAY_BLOCK;
+    for (uint32_t tick = 0; tick < REPLAY_TICKS; tick += ticks) {
+        REPLAY_SAMPLE sample[REPLAY_BLOCK * REPLAY_CHANNELS];
+        ticks = ((REPLAY_TICKS - tick) < ticks) ? (REPLAY_TICKS - tick) : ticks;
+        for (uint32_t i = 0; i < (ticks * REPLAY_CHANNELS); i++) {
+            const uint32_t channel = i % REPLAY_CHANNELS;
+            sample[i] = sample_of(COUNT(tick + (i / REPLAY_CHANNELS), channel), replay_lsb[channel]);
         }
         const uint32_t before = pvid_port_instructions();
-        const pvid_reason reason = REPLAY_STEP(&identifier, sample);
+        const pvid_reason reason = REPLAY_BLOCK_STEP(&identifier, sample, ticks);
         const uint32_t counts = pvid_port_instructions() - before - reading;
         if (tick >= REPLAY_MEASURE_FROM) {
             whole->total += counts;
-            whole->ticks++;
+            whole->ticks += ticks;
         }
         whole->longest = (counts > whole->longest) ? counts : whole->longest;
         hash = REPLAY_HASH(hash, &identifier.estimator, reason);
-        if (((tick + 1u) % REPLAY_REPORT_EVERY) == 0u) {
-            report_hash_at(tick + 1u, hash);
+        if (((tick + ticks) / REPLAY_REPORT_EVERY) > (tick / REPLAY_REPORT_EVERY)) {
+            report_hash_at(tick + ticks, hash);
         }
     }
     return hash;

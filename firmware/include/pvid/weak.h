@@ -17,6 +17,7 @@
  *   static pvid_weak_f32 identifier;
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...     config: printed by `pvid model build`
  *   each tick:     reason = pvid_weak_step_f32(&identifier, sample);
+ *   or each block: reason = pvid_weak_step_block_f32(&identifier, samples, 24);
  *   same context:  estimate = pvid_weak_estimate_f32(&identifier);
  *   other context: if (pvid_weak_read_f32(&identifier, &copy, &number) && (number > 0)) ...
  *
@@ -189,6 +190,12 @@ static inline pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_wea
  *   - PVID_ACCUMULATED at all other ticks.
  * The work of a window is spread over the ticks of half a window; the work of a tick does not depend on the data. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, const float sample[]);
+
+/* So many ticks at once, of a buffer that a DMA has filled: samples [count][samples], tick by tick. The state is then
+ * the same in every bit as behind as many calls of step, for a sixth less instructions. Returns the reason of the last
+ * tick with a new estimate (PVID_UPDATED, PVID_MISFIT); if there is none, of the last one with a reason other than
+ * PVID_ACCUMULATED and PVID_WARMING_UP; else of the last. count 0: nothing is done. */
+pvid_reason pvid_weak_step_block_f32(pvid_weak_f32 *self, const float samples[], uint32_t count);
 
 /* The published estimate, for the context that calls step; the start before the first one. */
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);

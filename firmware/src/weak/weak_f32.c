@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "judge/outcome.h"
 #include "judge/publication.h"
 #include "judge/standing.h"
 #include "number/count.h"
@@ -364,42 +365,71 @@ static inline uint32_t items_of(const pvid_weak_f32 *self)
                : self->items_per_tick;
 }
 
-/* Some harmonics of the last block are added, or of the last window joined. */
-static pvid_reason add_harmonics(pvid_weak_f32 *self)
+/* In each of these ticks some harmonics of the last block are added, or of the last window joined. Returns the ticks
+ * that are left behind the last one. */
+PVID_NOINLINE static uint32_t add_harmonics(pvid_weak_f32 *self, uint32_t ticks)
 {
     mark_busy(self);
     pvid_weak_sums_f32 *sums = &self->sums;
-    for (uint32_t left = items_of(self); (left > 0u) && pvid_weak_sums_is_busy_f32(sums, harmonics_of(self)); left--) {
-        if (!pvid_weak_sums_joins_f32(sums)) {
-            pvid_weak_sums_add_f32(sums, self->design, self->channels);
-            continue;
+    const uint8_t harmonics = harmonics_of(self);
+    uint32_t left = ticks;
+    while ((left > 0u) && pvid_weak_sums_is_busy_f32(sums, harmonics)) {
+        for (uint32_t more = items_of(self); (more > 0u) && pvid_weak_sums_is_busy_f32(sums, harmonics); more--) {
+            if (!pvid_weak_sums_joins_f32(sums)) {
+                pvid_weak_sums_add_f32(sums, self->design, self->channels);
+                continue;
+            }
+            pvid_weak_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_weak_window_f32(self));
+            if (sums->joined == harmonics) {
+                pvid_weak_finish_begin_f32(&self->finish);
+            }
         }
-        pvid_weak_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_weak_window_f32(self));
-        if (sums->joined == harmonics_of(self)) {
-            pvid_weak_finish_begin_f32(&self->finish);
-        }
+        left--;
     }
-    if (!pvid_weak_sums_is_busy_f32(sums, harmonics_of(self))) {
+    if (!pvid_weak_sums_is_busy_f32(sums, harmonics)) {
         choose_task(self);
     }
-    return idle(self);
+    return left;
 }
 
-/* Some stages of the last whole window. */
-static pvid_reason process_window(pvid_weak_f32 *self)
+/* So many stages of the last whole window; nothing is left to do behind its last one. Returns the
+ * reason of them and those before. */
+PVID_NOINLINE static pvid_reason process_window(pvid_weak_f32 *self, uint32_t stages, pvid_reason before)
 {
     mark_busy(self);
-    uint32_t left = self->stages_per_tick;
-    self->finish.report = (uint8_t)idle(self);
-    do {
-        pvid_weak_finish_step_f32(self);
-        left--;
-    } while (left > 0u);
+    pvid_weak_finish_run_f32(self, stages);
     if (!pvid_weak_finish_is_busy_f32(&self->finish)) {
         count_window(self);
         choose_task(self);
     }
-    return (pvid_reason)self->finish.report;
+    const pvid_reason report = (pvid_reason)self->finish.report;
+    if (report == PVID_ACCUMULATED) {
+        return before;
+    }
+    self->finish.report = (uint8_t)PVID_ACCUMULATED;
+    return pvid_outcome(before, report);
+}
+
+/* The tasks of so many ticks, at least one, which end no block. Returns the reason of them and those before. */
+PVID_ALWAYS_INLINE pvid_reason run_tasks(pvid_weak_f32 *self, uint32_t ticks, pvid_reason before)
+{
+    pvid_reason reason = before;
+    uint32_t left = ticks;
+    if (self->task == TASK_FORM) {
+        reason = pvid_outcome(reason, form_channels(self));
+        left--;
+    }
+    if ((left > 0u) && (self->task == TASK_ADD)) {
+        left = add_harmonics(self, left);
+    }
+    return ((left > 0u) && (self->task == TASK_PROCESS)) ? process_window(self, left * self->stages_per_tick, reason)
+                                                         : reason;
+}
+
+/* That of a tick. */
+PVID_NOINLINE static pvid_reason run_task(pvid_weak_f32 *self)
+{
+    return run_tasks(self, 1, idle(self));
 }
 
 /* The samples of the tick of a step, whose channels follow. */
@@ -441,21 +471,8 @@ PVID_NOINLINE static pvid_reason end_block(pvid_weak_f32 *self, const float samp
         self->task = TASK_FORM;
         return idle(self);
     }
-    const pvid_reason formed = steps ? form_channels(self) : idle(self);
-    if ((decimation > 1u) || (self->task <= TASK_FORM)) {
-        return formed;
-    }
-    const pvid_reason worked = (self->task == TASK_ADD) ? add_harmonics(self) : process_window(self);
-    return (formed == idle(self)) ? worked : formed;
-}
-
-/* The task of a tick. */
-PVID_NOINLINE static pvid_reason run_task(pvid_weak_f32 *self)
-{
-    if (self->task == TASK_ADD) {
-        return add_harmonics(self);
-    }
-    return (self->task == TASK_PROCESS) ? process_window(self) : form_channels(self);
+    const pvid_reason reason = steps ? form_channels(self) : idle(self);
+    return (decimation == 1u) ? run_tasks(self, 1, reason) : reason;
 }
 
 /* What a tick does after its samples. */
@@ -466,7 +483,10 @@ static inline pvid_reason end_tick(pvid_weak_f32 *self, const float sample[])
         return end_block(self, sample);
     }
     const uint32_t task = self->task;
-    return (task >= TASK_FORM) ? run_task(self) : (pvid_reason)task;
+    if (PVID_LIKELY(task < TASK_FORM)) {
+        return (pvid_reason)task;
+    }
+    return (task == TASK_PROCESS) ? process_window(self, self->stages_per_tick, idle(self)) : run_task(self);
 }
 
 /* Of samples with one that is not finite or beyond its range: returns whether all are finite. */
@@ -488,7 +508,7 @@ static inline void add_samples(pvid_weak_f32 *self, const float sample[])
         return;
     }
 #endif
-    pvid_weak_front_add_f32(&self->front, self->samples, sample);
+    pvid_weak_front_add_f32(self->front.line, self->samples, sample);
 }
 
 /* A tick with a sample that is not finite or beyond its range. */
@@ -507,7 +527,7 @@ PVID_COLD static pvid_reason odd_tick(pvid_weak_f32 *self, const float sample[])
 /* A tick of the weak form. */
 PVID_ALWAYS_INLINE pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
 {
-    if (!pvid_weak_front_fits_f32(&self->front, self->samples, sample)) {
+    if (!pvid_weak_front_fits_f32(self->front.limit, self->samples, sample)) {
         return odd_tick(self, sample);
     }
     add_samples(self, sample);
@@ -535,6 +555,69 @@ pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, const float sample[])
         return PVID_NOT_READY;
     }
     return refines(self) ? both_ticks(self, sample) : weak_tick(self, sample);
+}
+
+/* Adds the samples of at most so many ticks of a block of steps, up to the first with one that is not finite or beyond
+ * its range. Returns of how many. */
+static inline uint32_t add_ticks(pvid_weak_f32 *self, const float samples[], uint32_t most)
+{
+    uint32_t added = 0;
+#if !PVID_EXACT_PLAIN
+    while (!is_plain(self) && (added < most) &&
+           pvid_weak_front_fits_f32(self->front.limit, self->samples, &samples[added * self->samples])) {
+        pvid_weak_front_derive_f32(&self->front, self->design->model, &samples[added * self->samples]);
+        added++;
+    }
+#endif
+    if (is_plain(self)) {
+        added = pvid_weak_front_add_ticks_f32(&self->front, self->samples, samples, most);
+    }
+    self->front.wait -= added;
+    return added;
+}
+
+/* Ticks of the weak form. */
+static pvid_reason weak_ticks(pvid_weak_f32 *self, const float samples[], uint32_t count)
+{
+    const size_t width = self->samples;
+    const float *sample = samples;
+    uint32_t left = count;
+    pvid_reason reason = idle(self);
+    while (left > 0u) {
+        const uint32_t most = (left < self->front.wait) ? left : self->front.wait;
+        const uint32_t added = add_ticks(self, sample, most);
+        const bool ends = self->front.wait == 0u;
+        sample = &sample[added * width];
+        left -= added;
+        const uint32_t between = added - (ends ? 1u : 0u);
+        if (between > 0u) {
+            reason = run_tasks(self, between, reason);
+        }
+        if (ends) {
+            reason = pvid_outcome(reason, end_block(self, sample - width));
+        }
+        if (added < most) {
+            reason = pvid_outcome(reason, odd_tick(self, sample));
+            sample = &sample[width];
+            left--;
+        }
+    }
+    return reason;
+}
+
+pvid_reason pvid_weak_step_block_f32(pvid_weak_f32 *self, const float samples[], uint32_t count)
+{
+    if (!is_ready(self) || (samples == NULL)) {
+        return PVID_NOT_READY;
+    }
+    if (!refines(self)) {
+        return weak_ticks(self, samples, count);
+    }
+    pvid_reason reason = idle(self);
+    for (uint32_t k = 0; k < count; k++) {
+        reason = pvid_outcome(reason, both_ticks(self, &samples[(size_t)k * self->samples]));
+    }
+    return reason;
 }
 
 const pvid_estimate_f32 *pvid_weak_candidate_f32(const pvid_weak_f32 *self)

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "judge/gate_f32.h"
+#include "judge/outcome.h"
 #include "judge/trust_f32.h"
 #include "number/count.h"
 #include "number/exact.h"
@@ -105,6 +106,7 @@ PVID_COLD pvid_status pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self, cons
     pvid_weak_scores_init_f32(&self->scores, config->estimator.forgetting_s * windows_hz);
     pvid_weak_error_init_f32(self->error, design);
     self->left = 1.0f;
+    self->report = (uint8_t)PVID_ACCUMULATED;
     self->stage = STAGE_IDLE;
     return PVID_OK;
 }
@@ -444,6 +446,12 @@ PVID_COLD static bool squares_stage(pvid_weak_f32 *self)
     return goes_on(finish, last, thetas);
 }
 
+/* A stage has something to report. */
+static void report(pvid_weak_finish_f32 *self, pvid_reason reason)
+{
+    self->report = (uint8_t)pvid_outcome((pvid_reason)self->report, reason);
+}
+
 /* Behind a kind: the next kind, or the solves; nothing if no kind has been added. */
 PVID_COLD static void end_kind(pvid_weak_f32 *self)
 {
@@ -498,7 +506,7 @@ PVID_COLD static bool gate_stage(pvid_weak_f32 *self)
     const float freedom = (float)self->design->functions - (float)finish->live;
     const pvid_reason accepted = accept_kind(self, freedom);
     if (accepted != PVID_ACCUMULATED) {
-        finish->report = (uint8_t)accepted;
+        report(finish, accepted);
         end_kind(self);
         return false;
     }
@@ -718,8 +726,8 @@ PVID_COLD static bool judge_stage(pvid_weak_f32 *self)
 PVID_COLD static bool publish_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
-    finish->report = (uint8_t)pvid_trust_publish_f32(&self->trust, &self->estimator, (pvid_reason)finish->verdict,
-                                                     finish->reason, &finish->candidate);
+    report(finish, pvid_trust_publish_f32(&self->trust, &self->estimator, (pvid_reason)finish->verdict, finish->reason,
+                                          &finish->candidate));
     if (pvid_weak_error_follows(self->design->model->kinds) && (finish->left < 1.0f)) {
         begin_anew(self);
     }
@@ -822,20 +830,21 @@ static bool run_stage(pvid_weak_f32 *self, uint8_t stage)
 }
 
 /* A stage that is complete is followed by the next one, if it names no other. */
-void pvid_weak_finish_step_f32(pvid_weak_f32 *self)
+void pvid_weak_finish_run_f32(pvid_weak_f32 *self, uint32_t stages)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
-    const uint8_t stage = finish->stage;
-    if (stage == (uint8_t)STAGE_IDLE) {
-        return;
-    }
-    finish->stage = (uint8_t)(stage + 1u);
-    if (run_stage(self, stage)) {
-        finish->stage = stage;
-    } else {
-        finish->index = 0;
-        finish->phase = 0;
-    }
+    uint32_t left = stages;
+    do {
+        const uint8_t stage = finish->stage;
+        finish->stage = (uint8_t)(stage + 1u);
+        if (run_stage(self, stage)) {
+            finish->stage = stage;
+        } else {
+            finish->index = 0;
+            finish->phase = 0;
+        }
+        left--;
+    } while ((left > 0u) && pvid_weak_finish_is_busy_f32(finish));
 }
 
 /* ---- their number ---- */

@@ -27,9 +27,10 @@ static inline bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self
     return self->stage != (uint8_t)PVID_WEAK_IDLE;
 }
 
-/* Runs one stage. Sets finish.report if a row is rejected, if the gate rejects the rows of a kind, or at the last
- * stage. */
-void pvid_weak_finish_step_f32(pvid_weak_f32 *self);
+/* Runs so many stages of a window that is being processed, at least one, or up to the last. finish.report is
+ * PVID_ACCUMULATED before; it becomes their reason if a row is rejected, if the gate rejects the rows of a kind, or at
+ * the last stage. */
+void pvid_weak_finish_run_f32(pvid_weak_f32 *self, uint32_t stages);
 
 /* Number of stages of a window, at most. */
 uint32_t pvid_weak_finish_stages_f32(const pvid_weak_f32 *self);

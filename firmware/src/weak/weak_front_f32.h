@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "number/exact.h"
 #include "number/finite_f32.h"
@@ -50,29 +51,51 @@ static inline uint32_t pvid_weak_front_limit_f32(float largest)
 }
 
 /* Returns whether none of this number of samples is beyond its limit: never before init, with no samples or limits. */
-static inline bool pvid_weak_front_fits_f32(const pvid_weak_front_f32 *self, uint32_t number, const float sample[])
+static inline bool pvid_weak_front_fits_f32(const uint32_t limit[], uint32_t number, const float sample[])
 {
     const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < count; i++) {
-        if ((pvid_bits_f32(sample[i]) << 1u) >= self->limit[i]) {
+        if ((pvid_bits_f32(sample[i]) << 1u) >= limit[i]) {
             return false;
         }
     }
     return count > 0u;
 }
 
-/* Adds this number of finite samples of a tick to the block. */
-static inline void pvid_weak_front_add_f32(pvid_weak_front_f32 *self, uint32_t number, const float sample[])
+/* Adds this number of finite samples of a tick to the block's sums. */
+static inline void pvid_weak_front_add_f32(float sums[], uint32_t number, const float sample[])
 {
     const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
-    float *sums = self->line;
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < count; i++) {
         const float once = sums[2u * i] + sample[i];
         sums[2u * i] = once;
         sums[(2u * i) + 1u] += once;
     }
+}
+
+/* Adds those of at most so many ticks, up to the first with one beyond its limit. Returns of how many. */
+static inline uint32_t pvid_weak_front_add_ticks_f32(pvid_weak_front_f32 *self, uint32_t number, const float samples[],
+                                                     uint32_t most)
+{
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
+    const float *sample = samples;
+    uint32_t left;
+    uint32_t limit[PVID_MAX_SAMPLES];
+    float sums[2 * PVID_MAX_SAMPLES];
+    memcpy(limit, self->limit, count * sizeof limit[0]);
+    memcpy(sums, self->line, 2u * count * sizeof sums[0]);
+    PVID_UNROLL_BY_FOUR
+    for (left = most; left > 0u; left--) {
+        if (!pvid_weak_front_fits_f32(limit, number, sample)) {
+            break;
+        }
+        pvid_weak_front_add_f32(sums, number, sample);
+        sample = &sample[count];
+    }
+    memcpy(self->line, sums, 2u * count * sizeof sums[0]);
+    return most - left;
 }
 
 #endif

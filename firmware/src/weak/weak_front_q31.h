@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "number/exact.h"
 #include "pvid/weak_q31.h"
@@ -67,6 +68,37 @@ static inline bool pvid_weak_front_plain_q31(pvid_weak_front_q31 *self, const pv
         sums[(2u * i) + 1u] += once;
     }
     return true;
+}
+
+/* The same of at most so many ticks, up to the first with a reading beyond its full scale. Returns of how many. */
+static inline uint32_t pvid_weak_front_plain_ticks_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design,
+                                                       uint32_t signals, const int32_t readings[], uint32_t most)
+{
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, signals);
+    const int32_t *full_scale = design->full_scale;
+    const int32_t *offset = self->offset;
+    const int32_t *reading = readings;
+    uint32_t left;
+    int32_t sums[2 * PVID_MAX_SAMPLES];
+    memcpy(sums, self->line, 2u * count * sizeof sums[0]);
+    for (left = most; left > 0u; left--) {
+        bool within = true;
+        PVID_UNROLL_EXACT
+        for (size_t i = 0; i < count; i++) {
+            within = within && pvid_weak_is_within_q31(pvid_weak_count_q31(reading[i], offset[i]), full_scale[i]);
+        }
+        if (!within) {
+            break;
+        }
+        PVID_UNROLL_EXACT
+        for (size_t i = 0; i < count; i++) {
+            sums[2u * i] += pvid_weak_count_q31(reading[i], offset[i]);
+            sums[(2u * i) + 1u] += sums[2u * i];
+        }
+        reading = &reading[count];
+    }
+    memcpy(self->line, sums, 2u * count * sizeof sums[0]);
+    return most - left;
 }
 
 /* Adds the readings of a tick to the block. Returns false if one is beyond its full scale; the front end must then be

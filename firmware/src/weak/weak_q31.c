@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "judge/outcome.h"
 #include "judge/publication.h"
 #include "judge/standing.h"
 #include "number/count.h"
@@ -302,6 +303,63 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, const int32_t reading[])
         return reject(self);
     }
     return end_tick(self, reading);
+}
+
+/* Adds the readings of at most so many ticks of a step, up to the first with one beyond its full scale. Returns of how
+ * many. */
+static uint32_t add_ticks(pvid_weak_q31 *self, const int32_t readings[], uint32_t most)
+{
+    pvid_weak_front_q31 *front = &self->accumulator.front;
+    uint32_t added = 0;
+    if (self->plain > 0u) {
+        added = pvid_weak_front_plain_ticks_q31(front, self->design, self->plain, readings, most);
+    } else {
+        const size_t width = self->design->model->samples;
+        while ((added < most) && pvid_weak_front_derive_q31(front, self->design, &readings[added * width])) {
+            added++;
+        }
+    }
+    front->wait -= added;
+    return added;
+}
+
+/* The work of so many ticks that end no step. Returns the reason of them and those before. */
+static pvid_reason run_tasks(pvid_weak_q31 *self, uint32_t ticks, pvid_reason before)
+{
+    pvid_reason reason = before;
+    for (uint32_t left = ticks; (left > 0u) && (self->task == BUSY); left--) {
+        reason = pvid_outcome(reason, work(self));
+    }
+    return reason;
+}
+
+pvid_reason pvid_weak_step_block_q31(pvid_weak_q31 *self, const int32_t readings[], uint32_t count)
+{
+    if (!is_ready(self) || (readings == NULL)) {
+        return PVID_NOT_READY;
+    }
+    const size_t width = self->design->model->samples;
+    const int32_t *reading = readings;
+    uint32_t left = count;
+    pvid_reason reason = idle_reason(self);
+    while (left > 0u) {
+        const uint32_t wait = self->accumulator.front.wait;
+        const uint32_t most = (left < wait) ? left : wait;
+        const uint32_t added = add_ticks(self, reading, most);
+        const bool ends = self->accumulator.front.wait == 0u;
+        reading = &reading[added * width];
+        left -= added;
+        reason = run_tasks(self, added - (ends ? 1u : 0u), reason);
+        if (ends) {
+            reason = pvid_outcome(reason, after(self, end_step(self, reading - width)));
+        }
+        if (added < most) {
+            reason = pvid_outcome(reason, reject(self));
+            reading = &reading[width];
+            left--;
+        }
+    }
+    return reason;
 }
 
 const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self)

@@ -178,7 +178,7 @@ typedef struct {
     uint8_t live;       /* nuisances of the kind that are projected out */
     uint8_t iteration;  /* solves done for this window */
     uint8_t verdict;    /* of trust.h on the candidate, a pvid_reason */
-    uint8_t report;     /* reason of the tick, if a stage sets one */
+    uint8_t report;     /* reason of the tick, if a stage sets one; else PVID_ACCUMULATED */
     uint8_t other;      /* column of the next product */
     uint16_t index;     /* within the stage */
     uint16_t phase;     /* of a column's stages */

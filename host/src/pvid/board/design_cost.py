@@ -12,9 +12,17 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.mechanism_board import refuse_unrefined
-from pvid.board.mechanism_image import build_mechanism_image, long_run, refuse_float_on_avr, run_of_samples
+from pvid.board.mechanism_image import (
+    build_mechanism_image,
+    identifier_of,
+    long_run,
+    refuse_float_on_avr,
+    run_of_samples,
+)
 from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image
+from pvid.board.mechanism_image_q31 import identifier_of as fixed_identifier_of
 from pvid.board.refined_image import RefinedRun, build_refined_image, light_work
+from pvid.board.replay_image import BLOCK
 from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_weak, figures_of, measured
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import refine_functions
@@ -81,6 +89,7 @@ class Cost:
     sample_rate : [Hz]
     first_s : time of the first published estimate; of both stages, of the refined one [s]; None: none was replayed
     equal : whether every hash that the board reported is that of the C core on this machine
+    in_blocks : the weak form with samples in blocks of BLOCK: mean of a sample, longest of a block; None: both stages
     refine : settings of the second stage; None: without
     """
 
@@ -92,6 +101,7 @@ class Cost:
     first_s: float | None
     equal: bool
     refine: RefineConfig | None = None
+    in_blocks: Footprint | None = None
 
     @property
     def shares(self) -> tuple[float, float] | None:
@@ -103,7 +113,7 @@ class Cost:
 
     def as_json(self) -> dict[str, Any]:
         """An entry of `cost` of `design --on --json`: as of `sizes --json`, and how it was measured."""
-        own = self.refine
+        own, blocks = self.refine, self.in_blocks
         shares = {} if self.shares is None else dict(zip(("mean_share", "longest_share"), self.shares, strict=True))
         return {
             "target": self.asked.board.name,
@@ -115,6 +125,7 @@ class Cost:
             "ticks": self.ticks,
             "first_s": self.first_s,
             **shares,
+            **({} if blocks is None else {"block": {"samples": BLOCK, "mean": blocks.mean, "longest": blocks.longest}}),
         }
 
 
@@ -201,8 +212,9 @@ def _in_float(
         record = weak_native(compiled, config.design).identifier_of(config).run_samples(run.samples, sums=False)
         first = _first(record.reason)
         run = run.shortened(_enough(first, config.ticks_needed, period, len(run.counts)))
-        built = built_weak(*build_mechanism_image(asked.board, run), run.name)
-        return _measured(asked, run.name, built, record.hash, first, rate)
+        images = [built_weak(*build_mechanism_image(asked.board, run, blocks=one), run.name) for one in (False, True)]
+        hashes = identifier_of(run).run_in_blocks(run.samples, BLOCK)
+        return _measured(asked, run.name, images[0], record.hash, first, rate, blocks=(images[1], hashes))
     both = RefinedRun(run, refine_functions(compiled), refine)
     record_of_both = both.native().run_both(run.samples)
     first = _first(record_of_both.told)
@@ -222,8 +234,9 @@ def _in_fixed_point(asked: Asked, weak: WeakQ31, signals: Run) -> Cost:
     first = _first(record.reason)
     period = weak.config.design.hop * weak.config.design.decimation
     run = run.shortened(_enough(first, weak.ticks_needed, period, len(run.counts)))
-    built = built_weak(*build_fixed_image(asked.board, run), run.name)
-    return _measured(asked, run.name, built, record.hash, first, weak.sample_rate)
+    built = [built_weak(*build_fixed_image(asked.board, run, blocks=one), run.name) for one in (False, True)]
+    hashes = fixed_identifier_of(run).run_in_blocks(run.counts, BLOCK)
+    return _measured(asked, run.name, built[0], record.hash, first, weak.sample_rate, blocks=(built[1], hashes))
 
 
 def _most_ticks(board: Board, bytes_a_tick: int) -> int:
@@ -250,8 +263,13 @@ def _measured(
     first: int | None,
     rate: float,
     refine: RefineConfig | None = None,
+    blocks: tuple[BuiltImage, npt.NDArray[np.uint32]] | None = None,
 ) -> Cost:
     footprint, report = measured(asked.board, built)
+    equal, in_blocks = report.differs_at(hashes) is None, None
+    if blocks is not None:
+        in_blocks, of_blocks = measured(asked.board, blocks[0])
+        equal = equal and of_blocks.differs_at(blocks[1]) is None
     return Cost(
         asked,
         model,
@@ -259,6 +277,7 @@ def _measured(
         report.ticks,
         rate,
         None if first is None else (first + 1) / rate,
-        report.differs_at(hashes) is None,
+        equal,
         refine,
+        in_blocks,
     )

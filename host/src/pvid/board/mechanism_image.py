@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header
-from pvid.board.replay_image import REPORT_EVERY
+from pvid.board.replay_image import REPORT_EVERY, in_blocks
 from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.generated import GeneratedModel
@@ -21,6 +21,7 @@ from pvid.codegen.weak_library import weak_native
 from pvid.configuration.weak import config_for_simulated_rig, samples_of
 from pvid.core.sizes import smallest
 from pvid.core.sources import left_out
+from pvid.core.weak_native import WeakIdentifier
 from pvid.design.c_tables import float_literal
 from pvid.model.compiled import CompiledModel
 from pvid.models import mechanisms
@@ -120,9 +121,14 @@ def mechanism_run(name: str, ticks: int | None = None, *, long: bool = False) ->
     return run_of_samples(compiled, config, samples).shortened(wanted)
 
 
+def identifier_of(run: MechanismRun) -> WeakIdentifier:
+    """The C core on this machine, initialised for the run."""
+    return weak_native(run.compiled, run.config.design).identifier_of(run.config)
+
+
 def native_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
-    return weak_native(run.compiled, run.config.design).identifier_of(run.config).run_samples(run.samples).hash
+    return identifier_of(run).run_samples(run.samples).hash
 
 
 def header(run: MechanismRun) -> str:
@@ -180,15 +186,22 @@ def files_of(run: MechanismRun) -> dict[str, str]:
     }
 
 
-def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]:
+def build_mechanism_image(target: Board, run: MechanismRun, *, blocks: bool = False) -> tuple[Path, Path]:
     """Builds the image for a board under build/targets, with arrays of the sizes that the run needs.
+
+    Parameters
+    ----------
+    blocks : samples are given in blocks
 
     Returns
     -------
     The image, and the tree it was built in.
     """
     refuse_float_on_avr(target)
-    return build_with(target, f"{run.name}-weak-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32")
+    files = files_of(run)
+    if blocks:
+        files["replay_run.h"] = in_blocks(files["replay_run.h"], "f32")
+    return build_with(target, f"{run.name}-weak-f32-{len(run.counts)}", files, fitted_sizes(run.config), "f32")
 
 
 def refuse_float_on_avr(target: Board) -> None:

@@ -12,12 +12,13 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with, long_run, measured_from
-from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
+from pvid.board.replay_image import IN_FLASH, REPORT_EVERY, in_blocks
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak_library import weak_native_q31
 from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.weak import simulated_run_of
 from pvid.configuration.weak_q31 import weak_q31_for_simulated_rig
+from pvid.core.weak_native_q31 import WeakIdentifierQ31
 from pvid.models import mechanisms
 
 MADE_BY = "pvid.board.mechanism_image_q31"
@@ -78,11 +79,15 @@ def fixed_run(name: str, ticks: int | None = None, *, long: bool = False) -> Fix
     return FixedRun(weak, counts, 0).shortened(wanted)
 
 
+def identifier_of(run: FixedRun) -> WeakIdentifierQ31:
+    """The C core on this machine, initialised for the run."""
+    weak = run.weak
+    return weak_native_q31(weak.made, weak.parameters, weak.config).identifier()
+
+
 def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
-    weak = run.weak
-    identifier = weak_native_q31(weak.made, weak.parameters, weak.config).identifier()
-    return identifier.run_samples(run.counts).hash
+    return identifier_of(run).run_samples(run.counts).hash
 
 
 def header(run: FixedRun) -> str:
@@ -133,11 +138,18 @@ def files_of(run: FixedRun) -> dict[str, str]:
     return files_weak_q31.files_of(run.weak, MADE_BY) | {"replay_run.h": header(run)}
 
 
-def build_fixed_image(target: Board, run: FixedRun) -> tuple[Path, Path]:
+def build_fixed_image(target: Board, run: FixedRun, *, blocks: bool = False) -> tuple[Path, Path]:
     """Builds the image for a board under build/targets, with arrays of the sizes that the run needs.
+
+    Parameters
+    ----------
+    blocks : samples are given in blocks
 
     Returns
     -------
     The image, and the tree it was built in.
     """
-    return build_with(target, f"{run.name}-weak-q31-{len(run.counts)}", files_of(run), run.sizes, "q31")
+    files = files_of(run)
+    if blocks:
+        files["replay_run.h"] = in_blocks(files["replay_run.h"], "q31")
+    return build_with(target, f"{run.name}-weak-q31-{len(run.counts)}", files, run.sizes, "q31")

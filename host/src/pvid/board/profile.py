@@ -6,13 +6,13 @@ import re
 import subprocess
 import tempfile
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
 from pvid.board.refined_image import build_refined_image
-from pvid.board.replay_image import parse_report
+from pvid.board.replay_image import BLOCK, parse_report
 from pvid.board.sizes import STANDARD, refined_replay
 from pvid.board.strong_image import build_image, measured_from, standard_run
 from pvid.board.weak_image import weak_image
@@ -101,6 +101,16 @@ def refined(board: Board) -> Profile:
     """
     run = refined_replay(board)
     return _counted(board, build_refined_image(board, run)[0], "pvid_weak_step_f32", run.weak.measure_from)
+
+
+def in_blocks(board: Board) -> Profile:
+    """Of the weak form of the standard mechanism in float32 with its samples in blocks.
+
+    Raises PvidError as `profile`.
+    """
+    made = weak_image(board, STANDARD, "f32", blocks=True)
+    found = _counted(board, made.image, "pvid_weak_step_block_f32", made.measure_from // BLOCK)
+    return replace(found, functions={name: n / BLOCK for name, n in found.functions.items()})
 
 
 def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:

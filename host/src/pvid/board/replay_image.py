@@ -12,8 +12,10 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.boards import run as run_image
+from pvid.settings.enums import Core
 
 REPORT_EVERY = 500  # ticks from one line with the running hash to the next
+BLOCK = 24  # samples that an image gives at once, where it gives them in blocks
 
 
 # REPLAY_IN_FLASH of replay_run.h: an AVR reads tables in flash by instructions of their own.
@@ -27,9 +29,16 @@ IN_FLASH = (
 )
 
 
+def in_blocks(header: str, core: Core) -> str:
+    """replay_run.h of an image that gives its samples in blocks."""
+    step = f"#define REPLAY_STEP pvid_weak_step_{core}"
+    assert step in header
+    return header.replace(step, f"#define REPLAY_STEP pvid_weak_step_block_{core}\n#define REPLAY_BLOCK {BLOCK}u")
+
+
 @dataclass(frozen=True)
 class ReplayReport:
-    """What the image printed. `instructions` are clock cycles on an AVR."""
+    """What the image printed. `instructions` are clock cycles on an AVR; the longest is a tick, or a block."""
 
     ticks: int
     hash: int

@@ -43,7 +43,7 @@ HEADER = (
 @dataclass(frozen=True)
 class Configuration:
     """A board, the arithmetic and the form of the identifier, of the shipped rig of `model`.
-    "refined" is the weak form with the refinement behind it."""
+    "refined" is the weak form with the refinement behind it, "block" the weak form with its samples in blocks."""
 
     board: Board
     form: str
@@ -57,7 +57,7 @@ class Configuration:
         return f"{self.board.name} {self.form} {self.core}{model}"
 
 
-WEAK, REFINED = "weak", "refined"
+WEAK, REFINED, IN_BLOCKS = "weak", "refined", "block"
 ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"))
 
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
@@ -66,16 +66,23 @@ ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}
 # The refinement is in float32: a processor with an FPU, and two without.
 WITH_REFINEMENT = ("microbit", "mps2-an385", "mps2-an386")
 
+# Boards whose samples are given in blocks as well: a DMA fills them.
+WITH_DMA = ("mps2-an386",)
+
 CONFIGURATIONS = tuple(
     Configuration(board, form, core)
     for board in BOARDS.values()
-    for form, core in (*ON_AVR.get(board.name, ALL), *([(REFINED, "f32")] if board.name in WITH_REFINEMENT else []))
+    for form, core in (
+        *ON_AVR.get(board.name, ALL),
+        *([(REFINED, "f32")] if board.name in WITH_REFINEMENT else []),
+        *([(IN_BLOCKS, "f32"), (IN_BLOCKS, "q31")] if board.name in WITH_DMA else []),
+    )
 )
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """Bytes, and instructions a tick (an AVR: clock cycles).
+    """Bytes, and instructions a tick (an AVR: clock cycles); in blocks `longest` is that of a block.
 
     text: the core's code and constants; arithmetic: what the compiler adds for it (soft float, division, memcpy);
     tables: the design's; data, bss: the core's variables, of which bss is the identifier's state; stack_bound and
@@ -146,7 +153,8 @@ def _strong(configuration: Configuration) -> BuiltImage:
 
 def _weak(configuration: Configuration) -> BuiltImage:
     """Of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
-    made = weak_image(configuration.board, configuration.model, CORES[configuration.core].name)
+    blocks = configuration.form == IN_BLOCKS
+    made = weak_image(configuration.board, configuration.model, CORES[configuration.core].name, blocks=blocks)
     return built_weak(made.image, made.tree, made.name)
 
 
@@ -176,6 +184,7 @@ def _refined(configuration: Configuration) -> BuiltImage:
 _BUILT: dict[str, Callable[[Configuration], BuiltImage]] = {
     **dict(zip(FORMS, (_weak, _strong), strict=True)),
     REFINED: _refined,
+    IN_BLOCKS: _weak,
 }
 
 

@@ -29,19 +29,19 @@ class WeakImage:
     measure_from: int
 
 
-def weak_image(board: Board, model: str, core: Core) -> WeakImage:
-    """Builds it for a board. Raises PvidError where there is no such mechanism, or it does not build."""
-    return _IMAGES[core](board, model)
+def weak_image(board: Board, model: str, core: Core, *, blocks: bool = False) -> WeakImage:
+    """Builds it for a board; blocks: of samples. PvidError where there is no such mechanism, or it does not build."""
+    return _IMAGES[core](board, model, blocks)
 
 
-def _in_float(board: Board, model: str) -> WeakImage:
+def _in_float(board: Board, model: str, blocks: bool) -> WeakImage:
     run = mechanism_run(model, long=True)
-    return WeakImage(*build_mechanism_image(board, run), run.name, run.measure_from)
+    return WeakImage(*build_mechanism_image(board, run, blocks=blocks), run.name, run.measure_from)
 
 
-def _in_fixed_point(board: Board, model: str) -> WeakImage:
+def _in_fixed_point(board: Board, model: str, blocks: bool) -> WeakImage:
     run = fixed_run(model, long=board.toolchain != "avr")  # which has no larger arrays than 32 kB
-    return WeakImage(*build_fixed_image(board, run), run.name, run.measure_from)
+    return WeakImage(*build_fixed_image(board, run, blocks=blocks), run.name, run.measure_from)
 
 
 _IMAGES = dict(zip(CORES, (_in_float, _in_fixed_point), strict=True))

@@ -139,6 +139,8 @@ def _measured(asked: Asked, model: CompiledModel, recording: Recording | None) -
 
 
 def _print_costs(costs: list[Cost]) -> None:
+    from pvid.board.replay_image import BLOCK
+
     asked, rate = costs[0].asked, costs[0].sample_rate
     unit = "clock cycles" if asked.board.toolchain == "avr" else "instructions"
     title = f"{asked.board.name} ({asked.board.core}), {CORES[asked.core].words}: {unit} of a tick, and bytes"
@@ -166,6 +168,9 @@ def _print_costs(costs: list[Cost]) -> None:
         what = "" if asked.board.toolchain == "avr" else ", one instruction a cycle"
         click.echo(f"%: of the {1000 / rate:.3g} ms between samples at {asked.clock_mhz:g} MHz{what}")
     for one in costs:
+        if one.in_blocks is not None:
+            mean, longest = one.in_blocks.mean, one.in_blocks.longest
+            click.echo(f"in blocks of {BLOCK} samples: {mean} {unit} a sample, {longest} in the longest block")
         if one.shares is not None and one.shares[1] > 1:
             write_stderr(
                 f"pvid: warning: {_stages(one.refine)}: the longest tick takes longer than from sample to sample"

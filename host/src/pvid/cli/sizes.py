@@ -58,6 +58,7 @@ def command(
         profiles = {name: profile.profile(on, "weak", core or "f32", name) for name in models} or {
             **{form: profile.profile(on, form) for form in FORMS},
             sizes.REFINED: profile.refined(on),
+            sizes.IN_BLOCKS: profile.in_blocks(on),
         }
         put_results(data, "profile", profile.HEADER, profile.table_rows(profiles))
         return DONE

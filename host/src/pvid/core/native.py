@@ -272,6 +272,24 @@ class Publisher(Stepper):
         """Whether it publishes trusted estimates only."""
         return True
 
+    def run_in_blocks(self, samples: npt.ArrayLike, ticks: int) -> npt.NDArray[np.uint32]:
+        """Steps through samples [all ticks, samples] in blocks of so many ticks.
+
+        Returns
+        -------
+        Running hash [all ticks], in a block that behind it.
+        """
+        given = np.ascontiguousarray(samples, self._arithmetic.sample)
+        pointer, estimator = self.native.headers.pointer, self.native.headers.ffi.addressof(self.estimator)
+        of_tick = getattr(self.native.library, f"pvid_fnv_estimator_{self.core}")
+        hashes = np.empty(len(given), np.uint32)
+        for first in range(0, len(given), ticks):
+            block = given[first : first + ticks]
+            reason = self._call("step_block", pointer(block), len(block))
+            self.running_hash = of_tick(self.running_hash, estimator, reason)
+            hashes[first : first + ticks] = self.running_hash
+        return hashes
+
     @property
     def is_published(self) -> bool:
         """Whether an estimate has been published yet."""
