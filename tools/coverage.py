@@ -6,7 +6,7 @@ tests/playback_weak.py.
     build/venv/bin/python tools/coverage.py
 
 Prints gcovr's table by file and the missed branches with their reasons of tests/coverage.toml; build/coverage/html has
-the sources with all counts. Five minutes of one core. Exits 1 below 95 % of the branches. PVID_ASSERT is compiled out:
+the sources with all counts. Six minutes of one core. Exits 1 below 95 % of the branches. PVID_ASSERT is compiled out:
 its other branch is misuse, and ends the program.
 """
 
@@ -19,7 +19,6 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +50,9 @@ MECHANISMS = (
     *(f"tests/core/test_{name}_q31.py" for name in ("weak_snapshot", "weak_rows", "trust")),
     *(f"tests/core/test_{name}.py" for name in ("kinds", "kinds_q31", "refinement")),
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "renewal", "snapshot_weak")),
+    *(f"tests/core/test_{name}.py" for name in ("constraints", "drift", "rebase", "record")),
+    *(f"tests/core/test_{name}.py" for name in ("core_q31", "dropped_calls", "equation_error", "standard_errors")),
+    *(f"tests/{name}.py" for name in ("twin/test_commissioning", "deploy/test_commission", "codegen/test_robot_core")),
     "tests/board/test_block.py",  # samples in blocks
     "tests/codegen/test_fitted_sizes.py",  # builds for one design
 )
@@ -69,9 +71,6 @@ for one; do
 done
 exec "{gcc}" "$@" -O0 {options} -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
 """
-# What tests compile and keep, under build/.
-KEPT = ("cache/models", "cache/plants")
-ASIDE = ROOT / "build" / "aside"
 
 
 def run(*command: str | Path, **environment: str) -> str:
@@ -114,31 +113,9 @@ def build() -> list[Path]:
     return programs
 
 
-def put_back() -> None:
-    """Builds that were set aside replace those of the counting compiler, also of a run that was ended."""
-    for place in KEPT:
-        if (ASIDE / place).exists():
-            shutil.rmtree(ROOT / "build" / place, ignore_errors=True)
-            (ASIDE / place).rename(ROOT / "build" / place)
-
-
-@contextmanager
-def set_aside() -> Iterator[None]:
-    """Without the builds of other tests, which would not count, and whose places those that count must not keep."""
-    put_back()
-    for place in KEPT:
-        own = ROOT / "build" / place
-        own.mkdir(parents=True, exist_ok=True)
-        (ASIDE / place).parent.mkdir(parents=True, exist_ok=True)
-        own.rename(ASIDE / place)
-    try:
-        yield
-    finally:
-        put_back()
-
-
 def play_mechanisms() -> None:
-    """Runs the tests of mechanisms, and plays their identifiers, with a compiler that counts."""
+    """Runs the tests of mechanisms, and plays their identifiers, with a compiler that counts; what it has compiled is
+    kept under its own name (host_compiler.build_of)."""
     tools, counts = BUILD / "bin", BUILD / "counts"
     for folder in (tools, counts):
         folder.mkdir()
@@ -146,12 +123,11 @@ def play_mechanisms() -> None:
         text = COUNTING.format(gcc=shutil.which(name), options=shlex.join(COUNTED), folder=counts)
         (tools / name).write_text(text, encoding="utf-8")
         (tools / name).chmod(0o755)
-    options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q")
+    options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q", "-m", "not night")
     path = os.pathsep.join((str(tools), os.environ["PATH"]))
     given = {"PATH": path, "CC": str(tools / "gcc"), "CCACHE_DISABLE": "1"}
-    with set_aside():
-        run(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS, **given)
-        run(sys.executable, "-c", PLAY_WEAK, PYTHONPATH=PYTHONPATH, **given)
+    run(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS, **given)
+    run(sys.executable, "-c", PLAY_WEAK, PYTHONPATH=PYTHONPATH, **given)
 
 
 def report() -> dict[str, Any]:
