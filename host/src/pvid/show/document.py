@@ -48,6 +48,7 @@ li { margin: .4rem 0; } ul { padding-left: 1.2rem; }
   .cards td { display: block; border: 0; padding: .1rem 0; } .cards tr { display: block; padding: .4rem 0;
     border-bottom: 1px solid var(--line); } .cards td::before { content: attr(data-head) " "; color: var(--quiet); }
   .cards td:empty { display: none; } }
+@media print, (max-width: 70rem) { .cards td.number { white-space: normal; } .cards td { padding-right: .5rem; } }
 @page { margin: 16mm; }
 @media print { :root { color-scheme: light; } body { font-size: 10.5pt; }
   main { max-width: none; padding: 0; } figure, tr, li, pre { break-inside: avoid; }
