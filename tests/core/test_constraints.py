@@ -1,7 +1,6 @@
 """Constraints between parameters: the estimate is that of sequential quadratic programming, in float64 and in C."""
 
 import subprocess
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 from constraint_sets import SETS, SIGMA
+from motor_run import TRUTH, recording
 from weak_rig import assert_equals_the_twin
 
 import pvid
@@ -20,14 +20,15 @@ from pvid.core.sources import INCLUDES, core_sources
 from pvid.identification.analysis import analysed
 from pvid.identification.core import identify_in_c
 from pvid.identification.road import identified
+from pvid.identification.strong import identify_strong_mechanism
 from pvid.model import Model
 from pvid.model.compiled import CompiledModel
 from pvid.model.identifiability import identifiable
 from pvid.model.report import check_report
 from pvid.model.together import with_own
+from pvid.oracle.strong_described import StrongRows, StrongSettings, all_rows, identify_strong
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.solve import Moments, gauss_newton
-from pvid.rig.run import Recording
 
 Float = npt.NDArray[np.float64]
 SEEDS = range(3)
@@ -102,8 +103,8 @@ def test_the_core_compiles_without_a_warning_for_any_room(room: int, tmp_path: P
 # ---- a mechanism: the torque constant is the back-EMF's, and the moment of inertia follows from it
 
 
-def motor(*more: str) -> CompiledModel:
-    """Constraints as text, in the unknowns' names."""
+def motor(*more: str, margin: str = "") -> CompiledModel:
+    """Constraints as text, in the unknowns' names; margin: what is at least 0."""
     model = Model("motor with two constants")
     w = model.sensor("w", "rad/s", noise=0.05, reach=300, gain_sd=0)
     i = model.sensor("i", "A", noise=0.01, reach=10, gain_sd=0)
@@ -117,28 +118,10 @@ def motor(*more: str) -> CompiledModel:
     model.equation(own["J"] * w.d() + own["b"] * w - own["kt"] * i)
     for one in more:
         model.constraint(sp.sympify(one, locals=own))
+    if margin:
+        least = model.unknown("margin", "ohm", 0.1, positive=False, low=0, sd=1.0)
+        model.constraint(sp.sympify(margin, locals=own) - least)
     return model.compiled("motor_two_constants")
-
-
-TRUTH = {"R": 1.2, "L": 2e-3, "ke": 0.06, "kt": 0.06, "J": 1.5e-4, "b": 2e-4}
-
-
-@cache
-def recording() -> Recording:
-    """8 s at 1 kHz of two square waves, exact between the samples."""
-    r, inductance, k, _, j, b = TRUTH.values()
-    a = np.array([[-r / inductance, -k / inductance], [k / j, -b / j]])
-    values, vectors = np.linalg.eig(a * 1e-3)
-    step = (vectors * np.exp(values)) @ np.linalg.inv(vectors)
-    force = np.linalg.solve(a, (step - np.eye(2)) @ [1 / inductance, 0.0]).real
-    t: Float = np.arange(8000, dtype=np.float64) * 1e-3
-    v = 6 * np.sign(np.sin(6.9 * t + 0.1)) + 4 * np.sign(np.sin(23.2 * t + 1))
-    x = np.zeros((len(t), 2))
-    for n, one in enumerate(v[:-1]):
-        x[n + 1] = step.real @ x[n] + force * one
-    rng = np.random.default_rng(0)
-    i, w = x[:, 0] + 0.01 * rng.normal(size=len(t)), x[:, 1] + 0.05 * rng.normal(size=len(t))
-    return Recording(np.asarray(t, np.float64), {"w": w, "i": i, "V": v}, 1000.0)
 
 
 def test_a_constraint_makes_identifiable_what_the_rows_do_not_determine() -> None:
@@ -168,12 +151,58 @@ def test_tied_parameters_are_found_with_their_errors_in_float64_and_in_c() -> No
     assert p[2] != np.float32(0.05) and p[2] == pytest.approx(p[3], rel=1e-6)
 
 
-def test_a_refinement_that_keeps_no_constraints_is_refused() -> None:
-    answer = identified(recording(), motor("ke - kt"), refine=True, predict=False)
+def test_the_refinement_keeps_constraints_with_their_errors() -> None:
+    """Without it kt, J and b have no value; the redundant second one does no harm."""
+    answer = identified(recording(), motor("ke - kt", "ke**2 - kt**2"), refine=True, predict=False)
+    assert answer.refinement is not None and answer.refinement.adopted
+    found = answer.values
+    assert found["ke"].value == pytest.approx(found["kt"].value, rel=1e-9)
+    assert found["ke"].se_noise == pytest.approx(found["kt"].se_noise, rel=1e-6)
+    for name, truth in TRUTH.items():
+        one = found[name]
+        assert one.value is not None and one.se_noise is not None, name
+        assert abs(one.value - truth) < 4 * one.se_noise and one.se_noise < 1e-3 * truth, name
+
+
+def test_a_refinement_without_a_margin_in_its_equations_is_refused() -> None:
+    answer = identified(recording(), motor("ke - kt", margin="R - R0"), refine=True, predict=False)
     assert answer.refinement is not None and not answer.refinement.adopted
-    assert "which the refinement does not keep" in answer.refinement.text
+    assert "margin is in no equation of the refinement" in answer.refinement.text
+
+
+def test_the_strong_form_keeps_constraints_in_float64() -> None:
+    found = identify_strong_mechanism(recording(), motor("ke - kt"), "f64")
+    for name, truth in TRUTH.items():
+        one = found.values[name]
+        assert one.value is not None and one.se is not None and abs(one.value - truth) < 4 * one.se, name
+    assert found.values["ke"].value == pytest.approx(found.values["kt"].value, rel=1e-9)
+    ticks = identify_strong(motor("ke - kt"), recording().signals, 1000.0, settings=StrongSettings(31, 6))
+    assert ticks.history[-1] == pytest.approx(ticks.p, rel=1e-3) and ticks.se[2] == pytest.approx(ticks.se[3])
+
+
+@pytest.mark.parametrize(("core", "what"), [("f32", "the printed strong form"), ("q31", "fixed point")])
+def test_the_printed_strong_form_refuses_constraints(core: str, what: str) -> None:
+    with pytest.raises(PvidError, match=f"which {what} does not keep"):
+        identify_strong_mechanism(recording(), motor("ke - kt"), core)
+
+
+def test_fixed_point_refuses_constraints() -> None:
     with pytest.raises(PvidError, match="which fixed point does not keep"):
-        identify_in_c(answer, "q31")
+        identify_in_c(analysed(recording(), motor("ke - kt")), "q31")
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_strong_form_in_float64_finds_the_same_optimum(name: str) -> None:
+    case, compiled = SETS[name], SETS[name].compiled()
+    parameters, n = Parameters(compiled), len(case.truth)
+    order = [int(str(one)[1:]) for one in compiled.rows[0].theta]
+    for seed in SEEDS:
+        rows, y = case.rows(seed)
+        p, _ = all_rows(parameters, StrongRows([rows[:, order]], [y], np.arange(400.0)), parameters.checked(None))
+        m, b = rows.T @ rows / SIGMA**2, rows.T @ y / SIGMA**2
+        errors = np.sqrt(np.diag(np.linalg.inv(m)))
+        best = case.optimum(m, b, p[:n] + 0.5 * errors)
+        assert np.max(np.abs(p[:n] - best) / errors) < 1e-3, (seed, p, best)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
-"""Parameters that drift along given directions alone: the C core against the batch problem that it solves, and a
-motor whose winding heats."""
+"""Parameters that drift along given directions alone: float64 and the C core against the batch problems that they
+solve, and a motor whose winding heats."""
+
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,7 @@ from pvid.model import Model
 from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
 from pvid.model.strong import strong_form
+from pvid.oracle.weak.drift import Forwards
 from pvid.rig.run import Recording
 
 Float = npt.NDArray[np.float64]
@@ -106,7 +109,7 @@ def test_a_drift_of_less_than_four_rows_is_refused() -> None:
 # ---- the weak form, printed for a motor with inductance and inertia
 
 
-def heating() -> CompiledModel:
+def heating(memory_s: float = 1.0, constants: int = 1) -> CompiledModel:
     model = Model("motor that heats")
     w = model.sensor("w", "rad/s", noise=0.05, reach=300, gain_sd=0)
     i = model.sensor("i", "A", noise=0.005, reach=10, gain_sd=0)
@@ -116,12 +119,17 @@ def heating() -> CompiledModel:
     k, j, b = model.unknown("k", "V*s", 0.03), model.unknown("J", "kg*m^2", 1e-4), model.unknown("b", "N*m*s", 1e-4)
     rise = model.unknown("rise", "K", 0.0, positive=False, sd=0.01, low=-40, high=150)
     model.equation(inductance * i.d() + r * i + k * w - v)
-    model.equation(j * w.d() + b * w - k * i)
+    kt = k if constants == 1 else model.unknown("kt", "V*s", 0.03)
+    model.equation(j * w.d() + b * w - kt * i)
     rates = {r: of_copper * r / (1 + of_copper * rise), k: -of_magnets * k / (1 - of_magnets * rise), rise: 1}
-    model.drift(rates, memory_s=1.0)
+    if constants == 2:
+        model.constraint(k - kt)
+        rates[kt] = -of_magnets * kt / (1 - of_magnets * rise)
+    model.drift(rates, memory_s)
     return model.compiled("heating")
 
 
+@cache
 def heated_run() -> tuple[Recording, Float]:
     """60 s at 1 kHz of two square waves, exact between the samples but for the heat, which begins at 10 s; R and k."""
     dt, n, inductance, j, b = 1e-3, 60000, 2e-3, 1.5e-4, 2e-4
@@ -148,7 +156,7 @@ def test_the_printed_weak_form_follows_the_heat_with_the_bits_of_its_twin() -> N
     hot, truth = heated_run()
     cold = Recording(hot.t[:10000], {name: one[:10000] for name, one in hot.signals.items()}, 1000.0)
     model = heating()
-    assert "In C R, k and rise drift together, with a memory of 1 s." in check_report(model)
+    assert "R, k and rise drift together, with a memory of 1 s." in check_report(model)
     answer = analysed(cold, model)
     assert answer.found.verdict.word == "good"
     config = config_to_identify(model, cold, answer.ranking)
@@ -164,9 +172,111 @@ def test_the_printed_weak_form_follows_the_heat_with_the_bits_of_its_twin() -> N
 
 
 def test_what_follows_no_drift_names_what_does() -> None:
-    """Float64 does not: its analysis takes the unknowns for constant."""
-    with pytest.raises(PvidError, match="a drift of its unknowns, .* the weak form in float32 follows it"):
+    with pytest.raises(PvidError, match="a drift of its unknowns, .* the weak form in float64 and float32 does"):
         strong_form(heating())
+
+
+def test_the_memory_must_be_four_half_windows_of_the_core() -> None:
+    answer = analysed(cut(heated_run()[0], 8000), heating(memory_s=0.01))
+    with pytest.raises(PvidError, match="memory of its drift, 0.01 s, is below the four half windows"):
+        identify_in_c(answer)
+
+
+# ---- float64
+
+
+def test_the_smoother_solves_the_least_squares_with_a_random_walk() -> None:
+    """Of two directions that turn, all windows and steps at once; its errors are those of the normal equations."""
+    rng = np.random.default_rng(2)
+    windows, n = 30, 4
+    rows, y = rng.normal(size=(windows, 3, n)), rng.normal(size=(windows, 3))
+    ways, steps = rng.normal(size=(windows, n, 2)), rng.uniform(0.01, 2, (windows - 1, 2))
+    s, f = np.einsum("wrp,wrq->wpq", rows, rows), np.einsum("wrp,wr->wp", rows, y)
+    own = Forwards.of(0.1 * np.eye(n), np.zeros(n), s, f, ways, steps)
+    p, covariance, change = own.smoothed()
+    unknowns = n + 2 * (windows - 1)
+    to_p = np.zeros((windows, n, unknowns))  # of the first p and all steps
+    for w in range(windows):
+        to_p[w:, :, :n] = np.eye(n)
+        if w + 1 < windows:
+            to_p[w + 1 :, :, n + 2 * w : n + 2 * w + 2] = ways[w]
+    whole = np.diag(np.concatenate([0.1 * np.ones(n), 1 / steps.ravel()]))
+    whole += np.einsum("wpi,wpq,wqj->ij", to_p, s, to_p)
+    best = np.linalg.solve(whole, np.einsum("wpi,wp->i", to_p, f))
+    spread = np.linalg.inv(whole)
+    moved = to_p[-1] - to_p[0]
+    assert p == pytest.approx(to_p @ best, abs=1e-9)
+    assert covariance == pytest.approx(to_p @ spread @ to_p.transpose(0, 2, 1), abs=1e-9)
+    assert change == pytest.approx(np.diag(moved @ spread @ moved.T), abs=1e-9)
+
+
+def winding(*guesses: float) -> CompiledModel:
+    """V = R i + k w, an algebraic equation."""
+    model = Model("winding")
+    v = model.sensor("V", "V", noise=0.02, reach=20, gain_sd=0)
+    i = model.sensor("i", "A", noise=0.002, reach=10, gain_sd=0)
+    w = model.sensor("w", "rad/s", noise=0.05, reach=300, gain_sd=0)
+    of_copper, of_magnets = model.known("alpha", "1/K", ALPHA), model.known("beta", "1/K", BETA)
+    r, k = (model.unknown(name, unit, guess) for name, unit, guess in zip("Rk", ("ohm", "V*s"), guesses, strict=True))
+    rise = model.unknown("rise", "K", 0.0, positive=False, sd=0.01, low=-100, high=200)
+    model.equation(r * i + k * w - v)
+    rates = {r: of_copper * r / (1 + of_copper * rise), k: -of_magnets * k / (1 - of_magnets * rise), rise: 1}
+    model.drift(rates, memory_s=1.0)
+    return model.compiled("winding")
+
+
+@pytest.mark.parametrize("start", [(0.6, 0.025), (1.8, 0.075)])
+def test_float64_follows_60_kelvin_from_starts_that_are_50_percent_off(start: tuple[float, float]) -> None:
+    t, rows, v, truth = heated(0)
+    answer = analysed(Recording(t, {"V": v, "i": rows[:, 0], "w": rows[:, 1]}, 20.0), winding(*start))
+    drifted = answer.found.drifted
+    assert drifted is not None and answer.found.verdict.word == "good"
+    at = np.stack([np.interp(drifted.t, t, one) for one in truth.T], axis=1)
+    off = drifted.p[drifted.t > 60, :2] / at[drifted.t > 60] - 1
+    assert (np.sqrt(np.mean(off**2, axis=0)) < 0.002).all()
+    assert (np.abs(drifted.p[[0, -1], :2] - at[[0, -1]]) < 4 * drifted.se[[0, -1], :2]).all()
+
+
+def cut(recording: Recording, samples: int) -> Recording:
+    return Recording(recording.t[:samples], {name: one[:samples] for name, one in recording.signals.items()}, 1000.0)
+
+
+def test_float64_publishes_where_a_drift_began_where_it_ended_and_how_far_it_went() -> None:
+    """And the core, configured by it, agrees on the end."""
+    hot, truth = heated_run()
+    answer = analysed(cut(hot, 24000), heating())
+    assert answer.found.verdict.word == "good" and answer.found.chi2 < 1.1
+    course = answer.as_json()["course"]
+    rise = 60 * (1 - np.exp(-14 / 240))
+    wanted = {"R": truth[[0, 23999], 0], "k": truth[[0, 23999], 1], "rise": np.array([0.0, rise])}
+    assert set(course) == set(wanted)
+    for name, (start, end) in wanted.items():
+        for part, value in (("start", start), ("end", end), ("change", end - start)):
+            one = course[name][part]
+            assert abs(one["value"] - value) < 4 * one["se"], (name, part)
+        assert course[name]["change"]["se"] < 0.1 * abs(end - start)
+        assert answer.values[name].value == pytest.approx(course[name]["end"]["value"], rel=1e-4)
+    assert "drifted, the values are those of the end: R from 1." in answer.lines[0]
+    assert "drift with a memory of 0.0" in answer.method[1]
+    core = identify_in_c(answer)
+    assert core.published and core.values["R"].value == pytest.approx(truth[23999, 0], rel=2e-3)
+    assert answer.found.history.shape == (len(answer.found.times), 6)
+
+
+def test_what_does_not_drift_has_gone_nowhere() -> None:
+    answer = analysed(cut(heated_run()[0], 8000), heating())
+    for one in answer.as_json()["course"].values():
+        assert abs(one["change"]["value"]) < 4 * one["change"]["se"]
+    assert answer.values["R"].value == pytest.approx(1.2, rel=3e-4)
+
+
+def test_a_drift_keeps_constraints() -> None:
+    """Both constants of the motor fall with the heat, and are one."""
+    answer = analysed(cut(heated_run()[0], 24000), heating(constants=2))
+    drifted = answer.found.drifted
+    assert drifted is not None
+    k, kt = (answer.model.p_names.index(one) for one in ("k", "kt"))
+    assert drifted.p[:, k] == pytest.approx(drifted.p[:, kt], rel=1e-6) and drifted.p[-1, k] < 0.0598
 
 
 def test_a_drift_that_cannot_be_is_refused() -> None:

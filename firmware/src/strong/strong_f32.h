@@ -599,7 +599,9 @@ PVID_ALWAYS_INLINE pvid_reason solve(strong_estimator_f32 *self, const float rhs
     float dp[STRONG_P];
     float raised[STRONG_P];
     const float *prior = (self->pinned != 0u) ? raise_pinned(self, raised) : self->prior;
-    pvid_reason reason = solved(self->s, prior, self->config->estimator.kappa_min, rhs, dp);
+    /* a pinned p[0] needs no excitation */
+    const float kappa_min = pvid_step_has_f32(self->pinned, 0u) ? 0.0f : self->config->estimator.kappa_min;
+    pvid_reason reason = solved(self->s, prior, kappa_min, rhs, dp);
     if (self->pinned != 0u) {
         hold_pinned(self, dp);
     }

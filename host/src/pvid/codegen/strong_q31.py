@@ -55,6 +55,7 @@ class FixedStrong:
 def fixed_strong(strong: StrongFunctions, reaches: Sequence[float], bounds: Sequence[Interval]) -> FixedStrong:
     """Formats of the rows; `bounds`: of p. Raises PvidError where fixed point cannot compute the rows, theta or C."""
     functions = strong.functions
+    functions.model.refuse_constraints("fixed point")
     given = [symmetric(one) for one in reaches]
     row = fixed(strong.row.program, given, f"{functions.name}, row")
     rates = functions.integrands.program

@@ -62,9 +62,15 @@ def weak_config(
     found : the analysis of this run, whose shared errors they are; None: those of the design
     """
     made = weak_tables(compiled, run, design, p)
+    there = made.p if compiled.drifted is None else compiled.drifted.p[0]
     config = config_of(
-        made.tables, design.sample_rate, made.rows.compiled.parameters, made.p if start_there else None, run
+        made.tables, design.sample_rate, made.rows.compiled.parameters, there if start_there else None, run
     )
+    if compiled.drifts and compiled.drift_s < 4 * config.hop_s:
+        raise PvidError(
+            f"{compiled.name}: the memory of its drift, {compiled.drift_s:g} s, is below the four half windows of "
+            f"{config.hop_s:.3g} s that the identifier needs: record at a higher rate, or give memory_s more"
+        )
     if not shared:
         return config
     errors = made.shared(run, found)

@@ -51,7 +51,7 @@ def analysed(
             again = attempted(lambda: identify(other, recording.run, recording.sample_rate, weights=weights))
         if again is not None and _determined(again) > _determined(found):
             whole, found = other, again
-    model = whole
+    model = whole if found.drifted is None else replace(whole, drifted=found.drifted)
     notes = *_of_own(model, own), *_of_edges(model), *_of_segments(recording, found)
     noted = replace(recording, notes=(*recording.notes, *notes))
     return Analysis(model, found, values_of_found(model, found), noted, weights)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pvid.base.rounding import part_of_one
+from pvid.base.rounding import part_of_one, with_error
 from pvid.base.wording import listed
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.compiled import CompiledModel
@@ -303,12 +303,15 @@ class Analysis(Answer):
 
     @property
     def lines(self) -> list[str]:
-        """The prediction."""
+        """The prediction, or the drift, with which none is made."""
+        if course := course_of(self.found, self.model) if self.identified else {}:
+            ways = "; ".join(_drift_text(name, one) for name, one in course.items())
+            return [f"drifted, the values are those of the end: {ways}; motion is not predicted"]
         return [f"predicts motion that was not fitted: {listed(self.prediction)}"] if self.prediction else []
 
     @property
     def method(self) -> list[str]:
-        """Residuals, and the refinement."""
+        """Residuals, the memory of a drift, and the refinement."""
         found = self.found
         explained = ", ".join(f"{name} {part_of_one(value, 6)}" for name, value in found.r2.items())
         of_weak = "" if self.stage == "weak form" else "weak form: "
@@ -316,6 +319,8 @@ class Analysis(Answer):
             f"{of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "
             f"{found.design.window_s:.3g} s; R^2 {explained}"
         ]
+        if found.drifted is not None:
+            lines.append(f"drift with a memory of {found.drifted.memory_s:.2g} s")
         if self.refinement is not None:
             extras = self.refinement.fit.extras if self.refinement.fit is not None and self.refinement.adopted else {}
             shown = [f"{name} {value:.3g} ± {se:.1g}" for name, (value, se) in extras.items()]
@@ -352,6 +357,7 @@ class Analysis(Answer):
                 "form": "weak",
             }
             | ({} if self.refinement is None else {"refinement": self.refinement.as_json()})
+            | ({"course": course} if (course := course_of(found, self.model)) else {})
         )
 
 
@@ -369,6 +375,26 @@ def recordings_of(answer: Analysis) -> dict[str, Any]:
         for one in recording.origins
     }
     return {"recordings": each}
+
+
+def course_of(found: Identified, model: CompiledModel) -> dict[str, Any]:
+    """Of each parameter that drifts, where it was at the start and at the end, and how far it has gone; {}: none."""
+    drifted = found.drifted
+    if drifted is None:
+        return {}
+    moving = [k for k in range(len(model.p)) if any(way[k] != 0 for way in model.drifts)]
+    out = {}
+    for k in moving:
+        (start, end), (se_start, se_end) = drifted.p[[0, -1], k], drifted.se[[0, -1], k]
+        ways = {"start": (start, se_start), "end": (end, se_end), "change": (end - start, drifted.change_se[k])}
+        parts = {name: {"value": float(value), "se": float(se)} for name, (value, se) in ways.items()}
+        out[model.p_names[k]] = {"unit": model.unknowns[k].unit, **parts}
+    return out
+
+
+def _drift_text(name: str, course: Mapping[str, Any]) -> str:
+    start, end, change = (" ± ".join(with_error(*course[one].values())) for one in ("start", "end", "change"))
+    return f"{name} from {start} to {end} {course['unit']}, by {change}"
 
 
 def missing_of(found: Identified) -> dict[str, Any] | None:

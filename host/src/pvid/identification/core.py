@@ -112,9 +112,7 @@ class CoreAnswer(Answer):
 
     @property
     def verdict(self) -> Verdict:
-        """The doubts of the core's own answer, then those of the analysis, which takes drifts for errors."""
-        if self.model.drifts:
-            return Verdict(tuple(self._doubts()))
+        """The doubts of the core's own answer, then those of the analysis."""
         return Verdict((*self._doubts(), *self.analysis.found.verdict.reasons))
 
     def _doubts(self) -> Iterator[Reason]:
@@ -129,7 +127,7 @@ class CoreAnswer(Answer):
                 "the float64 analysis.",
             )
             return
-        if not self.model.drifts and (apart := [name for name in self.model.p_names if self._clashes(name)]):
+        if apart := [name for name in self.model.p_names if self._clashes(name)]:
             first = [values[apart[0]] for values in (self.values, self.analysis.values)]
             one, other = (with_unit(found.value or 0.0, found.unit, 4) for found in first)
             of_signs = " The core takes the mean of a friction's sign over a step, the analysis locates its reversals."
@@ -285,8 +283,7 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
     ends = record.reason[~np.isin(record.reason, _WITHIN)]
     model, found = answer.model, answer.found
     # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
-    drifts = bool(model.drifts)  # the analysis takes for constant what the core follows: its distance is no error
-    wider = np.ones(len(run.p)) if drifts else np.maximum(found.noise / np.sqrt(np.diag(run.covariance)), 1.0)
+    wider = np.maximum(found.noise / np.sqrt(np.diag(run.covariance)), 1.0)
     covariance = run.covariance * np.outer(wider, wider)
     # A core searches logarithms: of what may be 0 it stays uncertain, and publishes nothing.
     by_analysis = not published and any(one.status == "near_zero" for one in found.judged)
@@ -297,11 +294,8 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
     apart = np.abs(found.p - run.p)
     noise = np.hypot(found.noise, np.sqrt(np.diag(covariance)))
     shifts = np.vstack([found.shifts, np.where(apart > CLASH * noise, apart, 0.0)])
-    shifts = shifts[:0] if drifts else shifts
 
     def values(verdict: Verdict) -> Mapping[str, Value]:
-        if drifts:
-            verdict = Verdict(())
         if by_analysis:
             return answer.values
         return values_of(model, run.p, covariance, found.gains, judged, verdict, shifts)

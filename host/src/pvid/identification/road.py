@@ -56,7 +56,7 @@ def identified(
 def judged_by_prediction(answer: Analysis) -> Analysis:
     """The answer with how well it predicts motion that was not fitted; where the equations do not explain the recording
     and no refinement has been adopted, the estimate that predicts it best."""
-    if not answer.identified and answer.is_explained:
+    if not answer.identified and answer.is_explained or answer.model.drifts:  # one p predicts no motion of others
         return answer
     from pvid.identification.judge import judged, with_prediction  # loads the simulation
 

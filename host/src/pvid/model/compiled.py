@@ -12,6 +12,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.model.chain import Chain
+from pvid.model.drifted import Drifted
 from pvid.model.signals import Jet
 from pvid.settings.forms import FORMS
 
@@ -291,6 +292,7 @@ class CompiledModel:
     constraints : expressions = 0 in p and known constants
     drifts : directions in which alone p changes in time, each [n_p], in p and known constants
     drift_s : time constant of what the rows tell along them [s]
+    drifted : how p drifted in a recording, which its rows are without: p is that of its end; None: not known
     anchors : unknowns of drifts that are in no equation -> standard deviation of their start, all that is known of them
     chain : of a robot, which has no rows and equations: p are its base parameters
     meanings : of parameters, in a few words, for those who read a report
@@ -313,6 +315,7 @@ class CompiledModel:
     constraints: tuple[sp.Expr, ...] = ()
     drifts: tuple[tuple[sp.Expr, ...], ...] = ()
     drift_s: float = 0.0
+    drifted: Drifted | None = None
     anchors: Mapping[sp.Symbol, float] = field(default_factory=dict)
     chain: Chain | None = None
     meanings: Mapping[str, str] = field(default_factory=dict)
@@ -338,12 +341,11 @@ class CompiledModel:
     def refuse_constraints(self, what: str) -> None:
         """PvidError where there are any, or drifts, by what keeps none."""
         if self.constraints or self.drifts:
-            kind, by = (
-                ("constraints between", "float64 and float32 does")
-                if self.constraints and not self.drifts
-                else ("a drift of", "float32 follows it")
+            kind = "a drift of" if self.drifts else "constraints between"
+            raise PvidError(
+                f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in float64 and "
+                "float32 does"
             )
-            raise PvidError(f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in {by}")
 
     def refuse_robot(self, what: str = "this command") -> None:
         """PvidError by what takes no robot."""

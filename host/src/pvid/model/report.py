@@ -57,7 +57,7 @@ def _tied(compiled: CompiledModel) -> str:
         lines.append(f"{count} constraint{'s tie' if count > 1 else ' ties'} {names}.")
     for rates in compiled.drifts:
         moving = listed([one.name for one, rate in zip(compiled.unknowns, rates, strict=True) if rate != 0])
-        lines.append(f"In C {moving} drift together, with a memory of {compiled.drift_s:g} s.")
+        lines.append(f"{moving} drift together, with a memory of {compiled.drift_s:g} s.")
     return "\n".join(lines)
 
 

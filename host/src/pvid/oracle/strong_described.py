@@ -27,7 +27,7 @@ from pvid.oracle.weak.filters import polynomial_weights
 from pvid.oracle.weak.front import filtered, of_hold, samples_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
-from pvid.oracle.weak.solve import inverse, solved
+from pvid.oracle.weak.solve import inverse, least_squares_step, solved
 
 _STEP_LIMIT = 0.3  # of log p, or of p over its reach
 _REWEIGHTINGS = 30
@@ -221,7 +221,7 @@ def all_rows(parameters: Parameters, rows: StrongRows, start: Float) -> tuple[Fl
         for w, mm, bb, th, c in zip(weights, m, b, parameters.theta(p), parameters.jacobian(p), strict=True):
             s += w * c.T @ mm @ c
             f += w * c.T @ (bb - mm @ th)
-        step = solved(s, f)
+        step = least_squares_step(parameters, p, s, f)
         size = float(np.max(np.abs(step) / reach))
         p = parameters.moved(p, step * min(1.0, _STEP_LIMIT / max(size, 1e-300)))
         if size < _SETTLED:
@@ -252,7 +252,8 @@ def by_ticks(
                 f += c.T @ (b[kind] - m[kind] @ theta[kind])
             else:
                 f += w * c.T @ n * (y - n @ theta[kind])
-        step = solved(s, f)
+        stays = settings.law == "stationary"
+        step = least_squares_step(parameters, p, s, f) if stays else solved(s, f, parameters.tangent(p))
         size = float(np.max(np.abs(step) / reach))
         p = parameters.moved(p, step * min(1.0, _STEP_LIMIT / max(size, 1e-300)))
         history[tick] = p
@@ -271,4 +272,5 @@ def standard_errors(parameters: Parameters, rows: StrongRows, p: Float, weights:
         information = information + w * own.T @ own
         scores += w * own * e[:, np.newaxis]
     blocks = scores[:whole].reshape(-1, block, len(p)).sum(axis=1)
-    return np.asarray(parameters.unit(p) * np.sqrt(clustered_variance(blocks, inverse(information))))
+    s_inverse = inverse(information, parameters.tangent(p))
+    return np.asarray(parameters.unit(p) * np.sqrt(clustered_variance(blocks, s_inverse)))

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.identification.refinement.kernel import Drive, RefinedKernel
+from pvid.oracle.weak.parameters import REDUNDANT, Parameters
 
 Float = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
@@ -25,6 +26,7 @@ Stretch = tuple[int, int]  # first sample, last + 1
 PASSES = 40
 _LARGEST = 0.3  # step of a logarithm in one pass
 _HALVINGS = 6
+_RETURNS = 3  # Newton steps back to the constraints
 _DAMPINGS = (1e-3, 1e-2, 0.1, 1.0, 10.0)  # of a step that leads nowhere
 _SETTLED = 0.01  # standard errors: of the last step
 _NEARLY = 0.3  # of one from which rounding leads no farther
@@ -192,6 +194,7 @@ class Problem:
         self.n = len(kernel.made.parameters)
         self.log = np.array([one.log for one in kernel.made.parameters])
         self.is_width = np.array([bool(one.sign) for one in kernel.made.parameters])  # of a sign
+        self._ties = Parameters(kernel.made.model) if kernel.made.model.constraints else None
 
     @property
     def stretches(self) -> Sequence[Stretch]:
@@ -208,7 +211,24 @@ class Problem:
         return Cut.of(self.stretches, samples)
 
     def moved(self, r: Float, step: Float) -> Float:
-        """r after a step [parameters]."""
+        """r after a step [parameters], on the constraints as far as Newton steps of least norm lead there."""
+        out = self._stepped(r, step)
+        for _ in range(0 if self._ties is None else _RETURNS):
+            out = self._stepped(out, self._ties_at(out)[0])
+        return out
+
+    def _ties_at(self, r: Float, free: npt.NDArray[np.intp] | slice = slice(None)) -> tuple[Float, Float]:
+        """The step back to the constraints, and a base of the steps that keep them, of the free entries of r."""
+        assert self._ties is not None
+        places = self.kernel.made.places_of_p
+        g, of_p = self._ties.constraints(r[places])
+        a = np.zeros((len(g), self.n))
+        a[:, places] = of_p
+        left, sizes, right = np.linalg.svd(a[:, free])
+        rank = int(np.sum(sizes > REDUNDANT))
+        return -right[:rank].T @ ((left[:, :rank].T @ g) / sizes[:rank]), right[rank:].T
+
+    def _stepped(self, r: Float, step: Float) -> Float:
         out = r.copy()
         head = out[: self.n]
         out[: self.n] = np.where(self.log, head * np.exp(np.where(self.log, step, 0.0)), head + step)
@@ -282,6 +302,7 @@ class Problem:
         """Gauss-Newton from r and these starts, at most so many passes, and none where the budget is spent; `move`
         False: of the starts alone."""
         free = np.flatnonzero(prior.free) if move else np.zeros(0, int)
+        r = self.moved(r, np.zeros(self.n))
         cost = self.cost(r, cut, starts, use, prior)
         converged, passes = False, 0
         found = None  # the block of r and these starts
@@ -367,13 +388,20 @@ class Problem:
             rows = np.concatenate(
                 [corner[:, :, columns].reshape(-1, len(columns)), np.column_stack([np.diag(1 / prior.sd[free]), pull])]
             )
+            tied = None if self._ties is None else self._ties_at(r, free)
+            if tied is not None:
+                rows = np.column_stack([rows[:, :-1] @ tied[1], rows[:, -1] - rows[:, :-1] @ tied[0]])
             scale = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
+            own = len(scale)
             if damping > 0:
                 rows = np.concatenate([rows, np.column_stack([np.diag(np.sqrt(damping) * scale), 0 * scale])])
             q = np.asarray(np.linalg.qr(rows / np.append(scale, 1.0), mode="r"))
-            whole = q[: len(free), : len(free)] * scale
-            d_r[free] = np.linalg.lstsq(q[: len(free), : len(free)], q[: len(free), -1], rcond=1e-13)[0] / scale
-            relative = float(np.linalg.norm(q[: len(free), -1]))
+            whole = q[:own, :own] * scale
+            moves = np.linalg.lstsq(q[:own, :own], q[:own, -1], rcond=1e-13)[0] / scale
+            if tied is not None:
+                whole, moves = whole @ tied[1].T, tied[0] + tied[1] @ moves
+            d_r[free] = moves
+            relative = float(np.linalg.norm(q[:own, -1]))
         right = top[:, :, -1] - (top[:, :, states:-1] @ d_r if len(free) else 0.0)
         left = top[:, :, :states]
         size = np.maximum(np.linalg.norm(left, axis=1), 1e-300)

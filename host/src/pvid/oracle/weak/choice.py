@@ -33,6 +33,7 @@ _SHORT_RUN = 10  # windows of a run that has no more: its halves are not compare
 _SEARCHED = 1  # lengths of window, the longest ones, with other starts than the guesses
 _SHORTEST_STEPS = 40  # of a window
 _LENGTHS = 6
+_OF_MEMORY = 0.45  # of a drift, the longest window: the core needs four half windows
 _FUNCTIONS = (12, 24, 40)
 _FEW_FUNCTIONS = (5, 8)  # of runs with motion that the equations do not explain: it is above the drive's frequencies
 _RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
@@ -253,7 +254,11 @@ def _ranked(
 
     windows: list[float] = []
     for fewest in at_least:
-        longer = lengths(_unbroken(parts, fewest), sample_rate, fewest)
+        whole = _unbroken(parts, fewest)
+        if model.bare.drifts:
+            most = max(_OF_MEMORY * model.bare.drift_s * sample_rate, 1.001 * _SHORTEST_STEPS)
+            whole = min(whole, most * (fewest + 1) / 2)
+        longer = lengths(whole, sample_rate, fewest)
         windows = sorted({*windows, *longer}, reverse=True)
         attempt(made(basis, window_s=one) for one in longer)
         if not any(one.known and not one.near_0 for one in tried):  # a logarithm that ran down may have lost its way

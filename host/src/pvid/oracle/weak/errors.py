@@ -48,18 +48,21 @@ def uncertainty(fit: Fit) -> Uncertainty:
     information, neighbours = moments_of(fit, designs)
     s_inverse = inverse(information, fit.tangent)
     covariance = covariance_of(information, neighbours, fit.tangent)
+    drifted = fit.rows.compiled.bare.drifted
+    more = np.zeros_like(covariance) if drifted is None else drifted.excess_of(fit.parameters.names)
     free = sum(one.free for one in fit.white) - fit.parameters.free(fit.p)
     weighted = sum(float(np.sum(e**2)) for e in residuals) / max(free, 1)
     predicted = unit * np.sqrt(np.diag(covariance) * max(1.0, weighted))
     scores = sum((np.einsum("wkp,wk->wp", d, e) for d, e in zip(designs, residuals, strict=True)))
     clustered = unit * np.sqrt(clustered_variance(np.asarray(scores), s_inverse))
+    predicted, clustered = (np.sqrt(one**2 + np.maximum(np.diag(more), 0)) for one in (predicted, clustered))
     return Uncertainty(
         np.maximum(predicted, clustered),
         predicted,
         clustered,
         chi2_of_sensors(fit),
         weighted,
-        covariance * np.outer(unit, unit),
+        covariance * np.outer(unit, unit) + more,
         explained(fit),
     )
 

@@ -11,12 +11,14 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
+from pvid.model.drifted import Drifted
 from pvid.oracle.weak import shared, verdict, work
 from pvid.oracle.weak.assessment import Assessed, assessed, estimated_near_zero
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import shift_of
 from pvid.oracle.weak.choice import Scored, basis_of, ranked
 from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.drift import with_drift
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.feedback import of_feedback
@@ -100,6 +102,11 @@ class Identified:
         return {name: (float(p), float(se)) for name, p, se in zip(self.names, self.p, self.se, strict=True)}
 
     @property
+    def drifted(self) -> Drifted | None:
+        """How p drifted during the run; None: nothing drifts."""
+        return self.fit.rows.compiled.bare.drifted
+
+    @property
     def gains(self) -> Float:
         """What p is off by for one standard deviation of each of the causes [causes, n_p]."""
         return np.array([one.moves for one in self.causes])
@@ -119,6 +126,8 @@ class Identified:
     @np.errstate(all="ignore")
     def history(self) -> Float:
         """p after each window, from the windows up to it [windows, n_p]; NaN where the search ran away."""
+        if self.drifted is not None:
+            return self.drifted.so_far
         return online(self.fit.rows, self.fit.start, self.with_error)
 
 
@@ -177,19 +186,22 @@ def identify(
     weights : "residuals": of the sensors and an error of the equations, estimated from the residuals; "sensors": of the
         sensors alone
     """
-    model = ready(compiled)
     begun = start_of(compiled, start)
     with_error = weights == "residuals"
     units = allowance_of(compiled, run, sample_rate)
-    if design is None:
-        with work.limited(units):
-            ranking = tuple(ranked(model, run, sample_rate, begun, with_error))
-        share = _OF_HOPELESS if ranking[0].is_hopeless else _OF_KNOWN if ranking[0].known else _OF_UNKNOWN
-        with work.limited(share * units):
-            return _judged(
-                compiled, run, ranking[0].design, begun, ranking[0].p, compensate, with_error, units, ranking
-            )
-    return _judged(compiled, run, design, begun, None, compensate, with_error, units)
+    ranking: tuple[Scored, ...] = ()
+    for _ in range(2 if compiled.drifts else 1):  # designs are compared anew in rows without the drift
+        if design is None:
+            with work.limited(units):
+                ranking = tuple(ranked(ready(compiled), run, sample_rate, begun, with_error))
+        used = ranking[0].design if design is None else design
+        if compiled.drifts:
+            compiled, begun = with_drift(compiled, run, used, begun, with_error)
+    if not ranking:
+        return _judged(compiled, run, used, begun, None, compensate, with_error, units)
+    share = _OF_HOPELESS if ranking[0].is_hopeless else _OF_KNOWN if ranking[0].known else _OF_UNKNOWN
+    with work.limited(share * units):
+        return _judged(compiled, run, used, begun, ranking[0].p, compensate, with_error, units, ranking)
 
 
 def _judged(

@@ -14,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import with_corners
+from pvid.model.drifted import Drifted
 from pvid.model.signals import Integral, Jet
 from pvid.model.together import in_columns
 from pvid.oracle.weak.channels import Channels, Record
@@ -220,6 +221,8 @@ class WeakRows:
         self.numbers = np.flatnonzero(whole)
         self.recordings = np.zeros(len(self.numbers), np.int64)
         self.columns = [one[whole] for one in columns]
+        if compiled.bare.drifted is not None:
+            self._take_off(compiled.bare.drifted)
         self.noise = NoiseModel(compiled.filters, record)
         self.reversals = ReversalNoise(compiled.channels, record)
         alone = [(kind,) for kind in range(len(columns))]
@@ -235,6 +238,18 @@ class WeakRows:
             grid = rows.record.grid
             rows.recordings = np.asarray(run[NUMBER])[grid.places[grid.design.hop * rows.numbers]].astype(np.int64)
         return rows
+
+    def _take_off(self, drifted: Drifted) -> None:
+        """The way of theta from each window to the end of a drift."""
+        parameters = self.compiled.parameters
+        centres = self.end_times() - self.functions.hop * self.functions.dt
+        p = np.tile(parameters.guess, (self.windows + 1, 1))
+        p[:, [parameters.names.index(one) for one in drifted.names]] = [*drifted.at(centres), drifted.p[-1]]
+        theta = [parameters.theta(one) for one in p]
+        for kind, columns in enumerate(self.columns):
+            of_kind = np.array([one[kind] for one in theta])
+            n = of_kind.shape[1]
+            columns[:, n] -= np.einsum("wck,wc->wk", columns[:, :n], of_kind[:-1] - of_kind[-1])
 
     @property
     def windows(self) -> int:

@@ -113,7 +113,7 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
     for k in range(steps):
         work.spend_step()
         s, f = normal(parameters, moments, p, theta)
-        step = _step(parameters, p, s + weak, f)
+        step = least_squares_step(parameters, p, s + weak, f)
         size = float(np.max(np.abs(step) / reach))
         step *= min(1.0, _STEP_LIMIT / max(size, 1e-300))
         first = size if k == 0 else first
@@ -131,7 +131,7 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
     return p, first
 
 
-def _step(parameters: Parameters, p: Float, s: Float, f: Float) -> Float:
+def least_squares_step(parameters: Parameters, p: Float, s: Float, f: Float) -> Float:
     """The least-squares step that keeps bounds and constraints, with the curvature of these where S stays positive."""
     if not parameters.model.constraints:
         return _bounded_step(s, f, parameters.blocked(p, f))
