@@ -363,7 +363,9 @@ def test_delay_is_named_with_what_explains_the_run_alike(samples: float) -> None
         return {"v": np.interp(place - samples, place, run["v"])}
 
     text = next(one.text for one in cell(late).verdict.reasons if one.name == "sensor")
-    named = re.match(r"v seems to be delayed by ([\d.]+) s.* these: i seems to be advanced by", text)
+    named = re.match(
+        r"v (?:seems to be delayed by|follows behind a lag of) ([\d.]+) s.* i seems to be advanced by", text
+    )
     delay = samples / simulation_of("battery_2rc").rig.sample_rate
     assert named is not None and 0.85 * delay < float(named[1]) < 1.4 * delay
 

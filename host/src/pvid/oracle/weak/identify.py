@@ -140,7 +140,7 @@ _NOT_REWEIGHTED = (
 
 # Of the work that is allowed to the search for a design: that of the rest where it finds a plausible estimate, terms
 # that are missing included, where it finds none, and where the equations explain nothing of a row.
-_OF_KNOWN, _OF_UNKNOWN, _OF_HOPELESS = 1.5, 0.3, 0.1
+_OF_KNOWN, _OF_UNKNOWN, _OF_HOPELESS = 1.5, 0.8, 0.1
 
 
 def allowance_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> float:
@@ -273,9 +273,10 @@ def _judged(
             if named is not None:
                 if named.complete:  # what is named explains a time constant within a sample, too
                     reasons = [one for one in reasons if one.name != "rate"]
-                    for one in (named.fit, named.further):
-                        lacking = lacking.also(one.p - fit.p)
-                reasons += of_missing(fit, lacking, named, min(found.r2))
+                    for shift in (named.fit.p - fit.p, named.further.p - fit.p, *named.instead):
+                        lacking = lacking.also(shift)
+                lost = [k for k, one in enumerate(judged) if one.status == "not_identified"]
+                reasons += of_missing(fit, lacking, named, min(found.r2), lost)
         if lacking is not None and (unknown := of_unexplained(compiled, found, lacking)):
             lacking = lacking.also(library.scores.by_parts())
             reasons += unknown

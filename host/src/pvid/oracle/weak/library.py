@@ -13,7 +13,7 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.evaluation import numpy_function
-from pvid.model.signals import Jet, order_of
+from pvid.model.signals import Integral, jets, order_of
 from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.filters import polynomial_weights
@@ -64,14 +64,19 @@ class Moving:
 
     Attributes
     ----------
-    of : a sensor, or a deflection
+    x, v : of a sensor, a deflection or a running integral, and its rate, at the steps [K]
+    unit : of x
     names : of the sensors that it is made of
-    rows : in which a force of the deflection acts, with its sign; {}: in any
+    rows : in which a force of the deflection acts, with its factor in each; {}: in any
+    is_integral : a running integral, whose rate is another signal
     """
 
-    of: Recorded
+    x: Float
+    v: Float
+    unit: str
     names: Sequence[str]
     rows: dict[int, float] = field(default_factory=dict)
+    is_integral: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,12 +151,14 @@ class Library:
         named: list[tuple[str, Law, float, dict[int, float]]] = [("", CONSTANT, 0.0, {})]
         values: list[Float] = [np.ones(grid.size)]
         for name, one in self._moving.items():
-            x, v = self._motion(one.of)
+            x, v = one.x, one.v
             second = any(order_of(equation, one.names) > 1 for equation in self.model.equations)
-            turns = one.of.signal.unit == "rad" and float(np.ptp(x)) > np.pi / 2
+            turns = one.unit == "rad" and float(np.ptp(x)) > np.pi / 2
             changes = float(np.min(x)) < 0 < float(np.max(x))
             for law in LAWS:
                 if law.angle > turns or law.signs > changes or law.inertia > second:
+                    continue
+                if one.is_integral and ".d(" in law.text:
                     continue
                 width = law.part * float(np.max(np.abs(x))) or law.width * float(np.sqrt(np.mean(v**2)))
                 width = float(f"{width:.2g}")
@@ -163,7 +170,8 @@ class Library:
         for place, (name, law, width, acts) in enumerate(named):
             for where in [acts] if acts else [{kind: 1.0} for kind in range(rows.kinds)]:
                 signs = tuple((self.model.rows[kind].name, sign) for kind, sign in where.items())
-                change, most = self._in_rows(signs, sums[place]), min(float(largest[kind][place]) for kind in where)
+                change = self._in_rows(signs, sums[place])
+                most = min(float(largest[kind][place]) / abs(factor) for kind, factor in where.items())
                 yield Candidate(signs[0][0], name, law, width, change, most=most, rows=signs)
 
     def _soft_frictions(self) -> Iterator[Candidate]:
@@ -288,7 +296,7 @@ class Library:
             return replace(one, change=self._softened(one.level))
         x, v = (np.ones(self.fit.rows.record.grid.size),) * 2
         if one.signal:
-            x, v = self._motion(self._moving[one.signal].of)
+            x, v = self._moving[one.signal].x, self._moving[one.signal].v
         return replace(one, change=self._in_rows(one.rows, self._sums([one.kind], [one.kind.of(x, v, one.level)])[0]))
 
     def _in_rows(self, signs: Sequence[tuple[str, float]], sums: Float) -> Change:
@@ -304,21 +312,33 @@ class Library:
 
     @cached_property
     def _moving(self) -> dict[str, Moving]:
-        """Sensors of the motion, and deflections: what a spring or a damper has between two sensors."""
-        out = {one.signal.name: Moving(one, [one.signal.name]) for one in self._recorded() if is_measured(one)}
+        """Sensors of the motion, running integrals, and deflections: what a spring or a damper has between two sensors.
+
+        A force of a deflection acts in each row by the deflection's slope, behind a gear by its ratio.
+        """
+        seen = {one.signal.name: one for one in self._recorded() if is_measured(one)}
+        out = {name: Moving(*self._motion(one), one.signal.unit, [name]) for name, one in seen.items()}
+        record = self.fit.rows.record
+        at_steps = dict(zip(record.channels.plain, record.arguments, strict=False))
+        for jet, expression in record.channels.opaque.items():
+            if expression.has(Integral) and len(x := np.nan_to_num(at_steps[jet])):
+                out[jet.of] = Moving(x, np.zeros(len(x)), "", [jet.of], is_integral=True)
         sensors = {one.jet for one in self.model.signals if one.kind == "sensor" and one.name in self.run}
         parts = ((kind, part) for kind, row in enumerate(self.model.rows) for part in row.regressors)
         for kind, psi in ((kind, sp.sympify(psi)) for kind, part in parts for n, psi in part.items() if n < 2):
-            slopes = {jet: psi.diff(jet) for jet in sorted(psi.free_symbols, key=str)}
+            psi = self.model.with_knowns(psi)
+            slopes = {jet: psi.diff(jet) for jet in sorted(jets(psi), key=str)}
             if len(slopes) < 2 or not sensors.issuperset(slopes) or not all(k.is_number for k in slopes.values()):
                 continue
-            sign = sp.sign(next(iter(slopes.values())))
-            name, names = f"({sign * psi})", [jet.of for jet in slopes]
+            factor = float(max(map(abs, slopes.values())) * sp.sign(next(iter(slopes.values()))))
+            ratios = {jet: float(k) / factor for jet, k in slopes.items()}
+            name = f"({sum(sp.nsimplify(f'{ratio:.9g}') * jet for jet, ratio in ratios.items())})"
+            names = [jet.of for jet in slopes]
             if name not in out:
-                parts_of = [float(sign * k) * np.asarray(self.run[jet.of]) for jet, k in slopes.items()]
-                signal = replace(self.model.signal(names[0]), jet=Jet(name))
-                out[name] = Moving(self._as_recorded(signal, np.asarray(sum(parts_of))), names)
-            out[name].rows[kind] = float(sign)
+                values = np.asarray(sum(ratio * np.asarray(self.run[jet.of]) for jet, ratio in ratios.items()))
+                signal = self.model.signal(names[0])
+                out[name] = Moving(*self._motion(self._as_recorded(signal, values)), signal.unit, names)
+            out[name].rows[kind] = factor
         return out
 
     def _recorded(self) -> Iterator[Recorded]:

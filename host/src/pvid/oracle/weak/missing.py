@@ -24,7 +24,7 @@ from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.scores import FOLDS, Scores
 from pvid.oracle.weak.solve import Fit, resumed
-from pvid.oracle.weak.terms import CONSTANT, JUMPS, OF_PARAMETER, UNUSUAL, UNUSUAL_LAWS, Act, Candidate, Course
+from pvid.oracle.weak.terms import CONSTANT, JUMPS, OF_LOAD, OF_PARAMETER, UNUSUAL, UNUSUAL_LAWS, Act, Candidate, Course
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
@@ -44,11 +44,10 @@ _LARGE = 0.05  # share of a term that is named even if it moves no parameter
 _FAMILIES = 5  # that are fitted for each
 _TRIED = 0.3  # of the best share
 _DISTINCT = 0.01  # of a column's square, that is its own: a term with less is the parameters in another guise
-_OF_BEST = 0.001  # the same of the term that explains most
 _SAME = 0.9999  # cosine of two columns, beside all parameters, that no run tells apart
 _RIVAL = 0.9  # of the best gain of likelihood
 _CHANGES = 0.5  # the same of what changes: its course is one of few, and what that leaves is no sign against another
-_EQUAL = 0.9999  # of the best gain: the same column
+_EQUAL, _BY_LUCK = 0.9999, 4.0  # of the best gain: the same column; what a gain is less or more by chance
 _MOST_RIVALS = 5
 _STAND_IN = 1.5  # times the chi^2 that is left with a term: without it no more is left, as it stood in for a later one
 _NOISE, _NOTICED = 2.0, 1.5  # chi^2 that is the sensors'; from which a term that explains much is looked for
@@ -198,6 +197,7 @@ class Explained:
     named : in this order
     fit : with all of them
     further : with what still seems to be lacking then and moves a parameter visibly, as far as it could be found
+    instead : what p moves by with a rival in place of a term [rivals, n_p]
     share : of the residuals beyond the sensors' noise, that they remove
     complete : what is left of them moves no parameter by what is visible, or is next to nothing
     """
@@ -205,6 +205,7 @@ class Explained:
     named: tuple[Named, ...]
     fit: Fit
     further: Fit
+    instead: tuple[Float, ...]
     share: float
     complete: bool
 
@@ -216,19 +217,23 @@ def explained(library: Library, found: Missing) -> Explained:
     likelihood of the residuals with weights of their own decides between them.
     """
     fit, named, share, complete = library.fit, list[Named](), 0.0, False
-    with_named, excess = fit, chi2_of_sensors(fit) - 1
+    with_named, instead, excess = fit, list[Float](), chi2_of_sensors(fit) - 1
     for _ in range(_MOST_TERMS):
-        before = unlikelihood(fit)
+        before, begun = unlikelihood(fit), fit.p
         groups = found.groups()
-        distinct = [one for one in groups if one[0].own > (_OF_BEST if one is groups[0] else _DISTINCT)][:_FAMILIES]
-        gains = _gains(library, fit, before, [group[0] for group in distinct])
+        tellable = [one for one in groups if one[0].own > _DISTINCT or one[0].share > _RIVAL * groups[0][0].share]
+        distinct = tellable[:_FAMILIES]
+        # A lag is a delay to first order alone.
+        leading = [one for group in distinct for one in group if one is group[0] or _is_lag(one)]
+        gains = _gains(library, fit, before, leading)
         if not gains:
             break
-        best = next(group for group in distinct if group[0].family == gains[0][1].family)
-        gains = sorted(gains + _gains(library, fit, before, best[1:_FAMILIES]), key=lambda one: -one[0])
+        best = next(group for group in distinct if gains[0][1].family in [one.family for one in group])
+        others = [one for one in best[:_FAMILIES] if one not in leading]
+        gains = sorted(gains + _gains(library, fit, before, others), key=lambda one: -one[0])
         alike = [one for one in gains if one[0] > _RIVAL * gains[0][0]]
-        equal = _EQUAL * gains[0][0]
-        _, chosen, fit = min(alike, key=lambda one: (_is_unusual(one[1]), one[0] < equal, not _is_simple(one[1])))
+        equal = min(_EQUAL * gains[0][0], gains[0][0] - _BY_LUCK)
+        _, chosen, fit = min(alike, key=lambda one: (_is_unusual(one[1]), one[0] < equal, _plainness(one[1])))
         # Beside those: what is the same column as one of them, and what explains as much and was not tried.
         nearly = partial(_rival, chosen)
         families = [one.family for _, one, _ in alike]
@@ -243,6 +248,8 @@ def explained(library: Library, found: Missing) -> Explained:
         ]
         if not complete:
             named.append(Named(chosen, _error_of(library, chosen, fit), tuple(rivals[:_MOST_RIVALS])))
+            refitted = {one.family: own.p for _, one, own in gains}
+            instead += [refitted.get(one.family, begun + one.shift) - library.fit.p for one in rivals[:_MOST_RIVALS]]
             named, fit = _without_superfluous(library, named, fit)
         found = Missing.of(library, uncertainty(fit).se, fit)
         if not complete:
@@ -254,7 +261,7 @@ def explained(library: Library, found: Missing) -> Explained:
             complete |= few and (share > _ALL or share > MOST and not changes and not found.visible.any())
         if complete and not found.visible.any():
             break
-    return Explained(tuple(named), with_named, fit, share, complete)
+    return Explained(tuple(named), with_named, fit, tuple(instead), share, complete)
 
 
 def _without_superfluous(library: Library, named: list[Named], fit: Fit) -> tuple[list[Named], Fit]:
@@ -319,10 +326,14 @@ def _rival(chosen: Candidate, one: Candidate) -> float:
     return _CHANGES if isinstance(chosen.kind, Course) and isinstance(one.kind, Course) else _RIVAL
 
 
-def _is_simple(one: Candidate) -> bool:
-    """Of terms that are the same column: a constant, of what is the same where a signal does not change its sign, and a
-    parameter of what changes."""
-    return one.kind in (CONSTANT, OF_PARAMETER)
+def _is_lag(one: Candidate) -> bool:
+    return isinstance(one.kind, Act) and one.kind.positive and one.kind.exact is not None
+
+
+def _plainness(one: Candidate) -> int:
+    """Order of terms that are the same column: a constant, of what is the same where a signal does not change its sign;
+    of what changes a parameter, then a load."""
+    return 0 if one.kind in (CONSTANT, OF_PARAMETER) else 1 if one.kind is OF_LOAD else 2
 
 
 def unlikelihood(fit: Fit) -> float:
@@ -342,6 +353,8 @@ def corrected(fit: Fit, term: Candidate) -> Fit:
 
 def _refitted(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit] | None:
     """A candidate with the size or level of most likelihood, and the fit with it; None: it leads nowhere."""
+    if isinstance(one.kind, Act) and one.kind.positive and one.size < 0:
+        return None
     if isinstance(one.kind, Act) and one.kind.exact:
         one = replace(one, kind=one.kind.exact, level=one.size, size=1.0)
     try:
@@ -352,13 +365,19 @@ def _refitted(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fi
         return None
     if with_it is None or not _is_nearer(with_it[1], fit) or _takes_place(with_it[1], library.fit):
         return None
-    return with_it
+    return None if _is_unphysical(with_it[1]) else with_it
 
 
 def _takes_place(one: Fit, other: Fit) -> bool:
     """Whether next to nothing is left of a parameter: the term is there in its place."""
     positive = other.parameters.positive
     return bool(np.any(one.p[positive] < _NOTHING * other.p[positive]))
+
+
+def _is_unphysical(one: Fit) -> bool:
+    """Whether a parameter that is positive, and may pass 0 as it is next to it, is below 0 by more than its error."""
+    positive = np.array([unknown.positive for unknown in one.rows.compiled.bare.unknowns])
+    return bool(np.any(positive & (one.p < 0)) and np.any(positive & (one.p < -MOVES * uncertainty(one).se)))
 
 
 def _nearest_jump(library: Library, fit: Fit, one: Candidate) -> Candidate:

@@ -12,7 +12,7 @@ import sympy as sp
 from pvid.base.rounding import percent
 from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
-from pvid.model.signals import total_derivative
+from pvid.model.signals import Integral, total_derivative
 from pvid.oracle.weak.errors import Uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.missing import VISIBLE, Explained, Missing, word_of
@@ -99,12 +99,13 @@ def _over(number: float, factor: float | None) -> float | None:
     return number / factor if factor and np.isfinite(number) else None
 
 
-def of_missing(fit: Fit, lacking: Missing, found: Explained, r2: float) -> list[Reason]:
+def of_missing(fit: Fit, lacking: Missing, found: Explained, r2: float, lost: Sequence[int] = ()) -> list[Reason]:
     """The doubt about an estimate and its cause; "unknown" where no cause explains it.
 
     Parameters
     ----------
     r2 : least of the equations
+    lost : parameters that the run does not determine without the cause
     """
     model, p, terms = fit.rows.compiled.bare, fit.p, terms_of(fit, found)
     relative = lacking.error / np.maximum(np.abs(p), 1e-300)
@@ -123,6 +124,8 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained, r2: float) -> list[
     if terms[0].text.startswith(("equation", "the ")):  # a signal's name keeps its letters
         causes = causes[0].upper() + causes[1:]
     now = found.fit.p
+    worst += [k for k in lost if k not in worst]
+    of_visible = of_some(model, [int(k) for k in worst])
     moved = [k for k in worst if abs(now[k] - p[k]) > VISIBLE / 2 * abs(p[k])] or worst[:1]
     values = [
         f"{model.p_names[k]} would be {with_unit(now[k], model.unknowns[k].unit, 4)} in place of {p[k]:.4g}"
@@ -174,7 +177,7 @@ def in_words(model: CompiledModel, one: Candidate, scale: Mapping[str, float | N
         law, parts = _law(one), _parts(one, scale)
         lacks = f"{one.where} {'seem' if one.where.startswith('equations') else 'seems'} to lack"
         if not parts:
-            return f"{lacks} a term in {law}"
+            return f"{lacks} a {'constant' if kind is CONSTANT else f'term in {law}'}"
         sizes = [(name, f"{factor * one.size:.3g}") for name, factor in parts]
         if kind is CONSTANT:
             return f"{lacks} a constant of {sizes[0][1]}"
@@ -229,7 +232,8 @@ def _law(one: Candidate) -> str:
 
 def scale_of(model: CompiledModel, kind: int, p: Float) -> float | None:
     """A row over the equation that the user wrote, at p; None where the row is no multiple of it."""
-    if len(model.rows) != len(model.equations):
+    integrals = sum(one.has(Integral) for one in model.opaque.values())  # whose rates are equations, too
+    if len(model.rows) + integrals != len(model.equations):
         return None
     row, equation = model.rows[kind], model.equations[kind]
     parts = [(theta, part) for theta, part in zip(row.theta, row.regressors, strict=True)] + [(-1, row.known)]

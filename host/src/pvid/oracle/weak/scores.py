@@ -29,7 +29,7 @@ from pvid.oracle.weak.terms import Candidate, Change
 FOLDS = 4  # contiguous parts of each recording: p and sizes from three, the share on the fourth
 
 # A column of which the parameters, or one of them, explain all but this part is theirs: no data show it.
-_OWN, _OF_ONE = 1e-4, 1e-3
+_OWN, _OF_ONE = 1e-6, 1e-5
 
 # What replaces a signal as a whole has a column of size 1.
 _WHOLE = (0.4, 2.5)

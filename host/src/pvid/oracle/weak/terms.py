@@ -135,6 +135,7 @@ class Act:
     most : from what was recorded the largest believable size
     applies : to what was recorded
     exact : of a size that is not small: the same, as levels; `of` is its first order
+    positive : a size below 0 means nothing
     typed : the true signal from the recorded one {u}, with the unknown {a}, as typed in a model; "": it cannot be
     """
 
@@ -146,6 +147,7 @@ class Act:
     most: Callable[[Recorded], float] = lambda _: np.inf
     applies: Callable[[Recorded], bool] = lambda _: True
     exact: Act | None = None
+    positive: bool = False
     typed: str = ""
 
     def tried(self, recorded: Recorded) -> tuple[float, ...]:
@@ -174,6 +176,11 @@ def _shifted(of: Recorded, delay: float) -> Float:
 def _early(of: Recorded, _: float) -> Float:
     """What is added to a signal that is recorded late by a second, to first order: 1 s of its rate."""
     return _rate(of, 3)
+
+
+def _ahead(of: Recorded, tau: float) -> Float:
+    """Without a first-order lag of this time constant [s]."""
+    return np.asarray(of.values + tau * _rate(of, 3))
 
 
 def _early_of_slow(of: Recorded, _: float) -> Float:
@@ -276,7 +283,7 @@ GAIN = Act(
     "percent",
     ("larger", "smaller"),
     most=lambda _: 0.2,
-    applies=_acts,
+    applies=lambda of: of.signal.driven or of.signal.gain_sd > 0,
     typed="{u}*(1 + {a})",
 )
 
@@ -286,7 +293,6 @@ OFFSET = Act(
     "signal",
     ("", "-"),
     most=lambda of: of.top,
-    applies=is_measured,
 )
 
 _DELAY = Act(
@@ -299,6 +305,7 @@ _DELAY = Act(
     typed="{u} + {a}*{u}.d()",
 )
 DELAY = replace(_DELAY, of=_early, levels=None, most=_quarter, exact=_DELAY)
+_SLOW = replace(_DELAY, text="follows behind a lag of {size}", of=_ahead, applies=is_measured, positive=True)
 _LATE = Act(
     "acts {word} by {size}",
     _shifted,
@@ -347,6 +354,7 @@ ACTS = (
     _LATE,
     DELAY,
     replace(DELAY, of=_early_of_slow),
+    replace(_SLOW, of=_early, levels=None, most=_quarter, exact=_SLOW),
     replace(_LATE, of=_early, levels=None, most=_quarter, exact=_LATE),
     Act(
         "acts as {u}*(1 {word} {size}*abs({u})/{top})",
@@ -386,7 +394,7 @@ ACTS = (
     ),
     GAIN,
     OFFSET,
-    Act("has a backlash of {size}", _play, "signal", most=_resolutions, applies=_is_stepped),
+    Act("has a backlash of {size}", _play, "signal", most=_resolutions, applies=_is_stepped, positive=True),
     *(
         Act(
             "has an eccentric encoder of amplitude {size}",
