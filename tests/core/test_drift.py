@@ -1,6 +1,8 @@
 """Parameters that drift along given directions alone: float64 and the C core against the batch problems that they
 solve, and a motor whose winding heats."""
 
+from copy import copy
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,6 +15,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.identification.analysis import analysed
+from pvid.identification.answer import Analysis
 from pvid.identification.core import identify_in_c
 from pvid.model import Model
 from pvid.model.compiled import CompiledModel
@@ -261,6 +264,36 @@ def test_float64_publishes_where_a_drift_began_where_it_ended_and_how_far_it_wen
     core = identify_in_c(answer)
     assert core.published and core.values["R"].value == pytest.approx(truth[23999, 0], rel=2e-3)
     assert answer.found.history.shape == (len(answer.found.times), 6)
+
+
+@cache
+def jumped() -> Analysis:
+    """The motor of constants that drift, whose current is off by 0.5 A from 5 s on; gains are known to 1 %."""
+    model, run = heating(), cut(heated_run()[0], 12000)
+    signals = {**run.signals, "i": run.signals["i"] + 0.5 * (run.t > 5)}
+    known_to = tuple(replace(one, gain_sd=0.01) for one in model.signals)
+    return analysed(replace(run, signals=signals), replace(model, signals=known_to))
+
+
+def test_the_history_has_a_value_at_each_window_though_the_course_left_out_others() -> None:
+    found = jumped().found
+    assert found.drifted is not None
+    fewer = replace(found.drifted, ends=found.drifted.ends[::3], so_far=found.drifted.so_far[::3])
+    rows = copy(found.fit.rows)
+    rows.compiled = copy(rows.compiled)
+    rows.compiled.bare = replace(rows.compiled.bare, drifted=fewer)
+    history = replace(found, fit=replace(found.fit, rows=rows)).history
+    assert history.shape == (len(found.times), 6) and history[::3] == pytest.approx(fewer.so_far)
+
+
+def test_the_end_of_the_course_has_the_error_of_the_value() -> None:
+    answer = jumped()
+    for name, one in answer.as_json()["course"].items():
+        value = answer.values[name]
+        assert (one["end"]["value"], one["end"]["se"]) == pytest.approx((value.value, value.se))
+    course = answer.as_json()["course"]["R"]
+    assert course["start"]["se"] > 0.01 * course["start"]["value"]  # a gain
+    assert course["change"]["se"] < np.hypot(course["start"]["se"], course["end"]["se"])
 
 
 def test_what_does_not_drift_has_gone_nowhere() -> None:

@@ -378,15 +378,24 @@ def recordings_of(answer: Analysis) -> dict[str, Any]:
 
 
 def course_of(found: Identified, model: CompiledModel) -> dict[str, Any]:
-    """Of each parameter that drifts, where it was at the start and at the end, and how far it has gone; {}: none."""
+    """Of each parameter that drifts, where it was at the start and at the end, and how far it has gone; {}: none.
+
+    The end is that of the values. What the noise of the end exceeds that of its course by, and what gains and missing
+    terms move it by, is in the errors of all three, in those of the change in proportion to it.
+    """
     drifted = found.drifted
     if drifted is None:
         return {}
     moving = [k for k in range(len(model.p)) if any(way[k] != 0 for way in model.drifts)]
     out = {}
     for k in moving:
-        (start, end), (se_start, se_end) = drifted.p[[0, -1], k], drifted.se[[0, -1], k]
-        ways = {"start": (start, se_start), "end": (end, se_end), "change": (end - start, drifted.change_se[k])}
+        start, end, se = drifted.p[0, k], found.p[k], found.se[k]
+        more = max(1.0, found.noise[k] / drifted.se[-1, k])
+        common = np.sqrt(max(se**2 - found.noise[k] ** 2, 0.0))
+        part = abs(end - start) / max(abs(start), abs(end), 1e-300)
+        change_se = np.hypot(more * drifted.change_se[k], part * common)
+        begin_se = np.hypot(more * drifted.se[0, k], common)
+        ways = {"start": (start, begin_se), "end": (end, se), "change": (end - start, change_se)}
         parts = {name: {"value": float(value), "se": float(se)} for name, (value, se) in ways.items()}
         out[model.p_names[k]] = {"unit": model.unknowns[k].unit, **parts}
     return out

@@ -20,7 +20,7 @@ class Drifted:
     names : of p
     t : its begin, the middle of each window, and its end [m], in s of the recording
     p : there, from the whole recording [m, n_p]
-    so_far : behind each window, from those up to it [m - 2, n_p]
+    ends, so_far : p at the end of each window that was used [m - 2], from those up to it [m - 2, n_p]
     se : standard errors of p by noise, at the ends also by the lag of a drift that goes on [m, n_p]
     change_se : of the change from begin to end [n_p]
     excess : covariance of the last p, beyond that of parameters that stay [n_p, n_p]
@@ -30,6 +30,7 @@ class Drifted:
     names: tuple[str, ...]
     t: Float
     p: Float
+    ends: Float
     so_far: Float
     se: Float
     change_se: Float
@@ -38,9 +39,17 @@ class Drifted:
 
     def at(self, t: Float) -> Float:
         """p at other times [.., n_p]: linear between nodes, as at the nearest one beyond them."""
-        return np.stack([np.interp(t, self.t, one) for one in self.p.T], axis=-1)
+        return _between(t, self.t, self.p)
+
+    def told_at(self, t: Float) -> Float:
+        """p from the windows up to other times [.., n_p]."""
+        return _between(t, self.ends, self.so_far)
 
     def excess_of(self, names: Sequence[str]) -> Float:
         """`excess` of these parameters, 0 of those that are no others [n, n]."""
         pick = np.array([[one == name for one in self.names] for name in names], np.float64)
         return np.asarray(pick @ self.excess @ pick.T)
+
+
+def _between(t: Float, nodes: Float, p: Float) -> Float:
+    return np.stack([np.interp(t, nodes, one) for one in p.T], axis=-1)

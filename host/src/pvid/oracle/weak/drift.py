@@ -88,7 +88,7 @@ def followed(fit: Fit) -> Drifted:
     change_se = np.sqrt(np.maximum(change, 0) + (last - first) ** 2)
     excess = covariance[-1] - inverse(np.diag(prior) + s.sum(axis=0)) + np.outer(last, last)
     p, so_far = (np.clip(end + one, parameters.low, parameters.high) for one in (p, so_far))
-    return Drifted(model.p_names, t, p, so_far[1:-1], se, change_se, excess, memory)
+    return Drifted(model.p_names, t, p, ends, so_far[1:-1], se, change_se, excess, memory)
 
 
 def _lag(t: Float, p: Float, memory: float) -> Float:

@@ -127,7 +127,7 @@ class Identified:
     def history(self) -> Float:
         """p after each window, from the windows up to it [windows, n_p]; NaN where the search ran away."""
         if self.drifted is not None:
-            return self.drifted.so_far
+            return self.drifted.told_at(self.times)  # the last fit may leave out other windows
         return online(self.fit.rows, self.fit.start, self.with_error)
 
 
