@@ -17,12 +17,17 @@ from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
 from pvid.identification.core import identify_in_c
+from pvid.identification.summary import Made
 from pvid.model import Model
 from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
 from pvid.model.strong import strong_form
 from pvid.oracle.weak.drift import Forwards
+from pvid.rig.columns import Columns
+from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Recording
+from pvid.rig.together import joined
+from pvid.show.report import report
 
 Float = npt.NDArray[np.float64]
 
@@ -244,10 +249,15 @@ def cut(recording: Recording, samples: int) -> Recording:
     return Recording(recording.t[:samples], {name: one[:samples] for name, one in recording.signals.items()}, 1000.0)
 
 
+@cache
+def hot() -> Analysis:
+    return analysed(cut(heated_run()[0], 24000), heating())
+
+
 def test_float64_publishes_where_a_drift_began_where_it_ended_and_how_far_it_went() -> None:
     """And the core, configured by it, agrees on the end."""
-    hot, truth = heated_run()
-    answer = analysed(cut(hot, 24000), heating())
+    _, truth = heated_run()
+    answer = hot()
     assert answer.found.verdict.word == "good" and answer.found.chi2 < 1.1
     course = answer.as_json()["course"]
     rise = 60 * (1 - np.exp(-14 / 240))
@@ -296,8 +306,32 @@ def test_the_end_of_the_course_has_the_error_of_the_value() -> None:
     assert course["change"]["se"] < np.hypot(course["start"]["se"], course["end"]["se"])
 
 
+def test_a_jump_that_the_drift_imitates_is_an_alarm_for_what_drifts() -> None:
+    answer = jumped()
+    reasons = {one.name: one for one in answer.found.verdict.reasons}
+    assert reasons["chi2"].alarm and "R, k and rise follow it" in reasons["chi2"].text
+    assert "good" not in (answer.values[one].word for one in ("R", "k", "rise"))
+
+
+def test_the_report_has_the_course_and_says_why_no_motion_is_predicted() -> None:
+    page = report(hot(), Made("pvid identify hot.csv"))
+    assert "Drifted, the values are those of the end: " in page and "(± standard errors)." in page
+    assert "Parameters may drift: one set of values predicts no motion." in page
+
+
+def test_several_recordings_have_no_course() -> None:
+    whole = heated_run()[0]
+    late = replace(cut(whole, 4000), signals={name: one[-4000:] for name, one in whole.signals.items()})
+    answer = analysed(joined([cut(whole, 4000), late], ["cold", "hot"], Columns(channels_of(heating()))), heating())
+    assert answer.found.drifted is not None and "course" not in answer.as_json()
+    assert answer.lines == [
+        "parameters may drift: the values are those of the end of the last recording; motion is not predicted"
+    ]
+
+
 def test_what_does_not_drift_has_gone_nowhere() -> None:
     answer = analysed(cut(heated_run()[0], 8000), heating())
+    assert answer.lines == ["no drift beyond its error; motion is not predicted"]
     for one in answer.as_json()["course"].values():
         assert abs(one["change"]["value"]) < 4 * one["change"]["se"]
     assert answer.values["R"].value == pytest.approx(1.2, rel=3e-4)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Float = npt.NDArray[np.float64]
 
 _NOISE = 2.0  # chi^2 over the sensors' noise up to which it explains the residuals
-
+_CLEAR = 2.0  # standard errors: a change beyond them is said
 
 LEVEL = 0.95  # of the intervals that are shown
 
@@ -304,10 +304,23 @@ class Analysis(Answer):
     @property
     def lines(self) -> list[str]:
         """The prediction, or the drift, with which none is made."""
-        if course := course_of(self.found, self.model) if self.identified else {}:
-            ways = "; ".join(_drift_text(name, one) for name, one in course.items())
-            return [f"drifted, the values are those of the end: {ways}; motion is not predicted"]
+        if self.drift:
+            return [f"{self.drift}; motion is not predicted"]
         return [f"predicts motion that was not fitted: {listed(self.prediction)}"] if self.prediction else []
+
+    @property
+    def drift(self) -> str:
+        """What drifted clearly, in a clause; "": there is nothing that drifts, or no value."""
+        if self.found.drifted is None or not self.identified:
+            return ""
+        course = course_of(self.found, self.model)
+        if not course:
+            return "parameters may drift: the values are those of the end of the last recording"
+        clear = {name: one for name, one in course.items() if _is_clear(**one["change"])}
+        if not clear:
+            return "no drift beyond its error"
+        ways = "; ".join(_drift_text(name, one) for name, one in clear.items())
+        return f"drifted, the values are those of the end: {ways}"
 
     @property
     def method(self) -> list[str]:
@@ -378,17 +391,17 @@ def recordings_of(answer: Analysis) -> dict[str, Any]:
 
 
 def course_of(found: Identified, model: CompiledModel) -> dict[str, Any]:
-    """Of each parameter that drifts, where it was at the start and at the end, and how far it has gone; {}: none.
+    """Of each parameter that drifts, where it was at the start and at the end, and how far it has gone; {}: none, or
+    several recordings, between which nothing is known of it.
 
     The end is that of the values. What the noise of the end exceeds that of its course by, and what gains and missing
     terms move it by, is in the errors of all three, in those of the change in proportion to it.
     """
     drifted = found.drifted
-    if drifted is None:
+    if drifted is None or np.ptp(found.fit.rows.recordings) > 0:
         return {}
-    moving = [k for k in range(len(model.p)) if any(way[k] != 0 for way in model.drifts)]
     out = {}
-    for k in moving:
+    for k in model.drifting:
         start, end, se = drifted.p[0, k], found.p[k], found.se[k]
         more = max(1.0, found.noise[k] / drifted.se[-1, k])
         common = np.sqrt(max(se**2 - found.noise[k] ** 2, 0.0))
@@ -399,6 +412,10 @@ def course_of(found: Identified, model: CompiledModel) -> dict[str, Any]:
         parts = {name: {"value": float(value), "se": float(se)} for name, (value, se) in ways.items()}
         out[model.p_names[k]] = {"unit": model.unknowns[k].unit, **parts}
     return out
+
+
+def _is_clear(value: float, se: float) -> bool:
+    return abs(value) > _CLEAR * se
 
 
 def _drift_text(name: str, course: Mapping[str, Any]) -> str:

@@ -338,6 +338,11 @@ class CompiledModel:
             tuple(self.p.index(own.get(one.symbol, one.symbol)) for one in self.alone.unknowns) for own in of_recordings
         )
 
+    @property
+    def drifting(self) -> list[int]:
+        """Places in p of what drifts."""
+        return [k for k in range(len(self.p)) if any(way[k] != 0 for way in self.drifts)]
+
     def refuse_constraints(self, what: str) -> None:
         """PvidError where there are any, or drifts, by what keeps none."""
         if self.constraints or self.drifts:

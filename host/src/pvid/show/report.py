@@ -76,6 +76,7 @@ def report(answer: Answer, made: Made, *, validation: Validation | None = None, 
         f'<p><span class="badge {_CLASS[word]}">{told}</span> <strong>{text(meaning)}</strong></p>',
         *(f"<p>{text(one)}</p>" for one in sentences(answer)),
         _values(answer.values, model.meanings) if answer.identified else "",
+        *_drift(answer),
         *_missing(answer, made),
         *_against(answer, validation, name),
         *_notes(answer),
@@ -103,6 +104,13 @@ def _values(values: Mapping[str, Value], meanings: Mapping[str, str]) -> str:
         rows.append([label, f"{told.value}{power}{unit}", f"{told.low} to {told.high}{power}{unit}", word])
     heads = ["parameter", "value", "95 % interval", "verdict"]
     return table(heads, rows, numbers=3 if all(one.value is not None for one in values.values()) else 0)
+
+
+def _drift(answer: Answer) -> Iterator[str]:
+    """What the parameters did, below their values."""
+    if isinstance(answer, Analysis) and answer.drift:
+        whole = answer.drift[0].upper() + answer.drift[1:]
+        yield f"<p>{text(whole)}{' (± standard errors)' if '±' in whole else ''}.</p>"
 
 
 def _missing(answer: Answer, made: Made) -> Iterator[str]:
@@ -140,6 +148,9 @@ def _against(answer: Answer, validation: Validation | None, name: str) -> Iterat
         yield f"<h2>Measured against predicted: {text(name)}, another recording</h2>"
         yield from _compared(answer, validation, "other", "The values are those of this report.")
     yield "<h2>Measured against predicted, on data that was not fitted</h2>"
+    if unseen is None and model.drifts:
+        yield "<p>Parameters may drift: one set of values predicts no motion.</p>"
+        return
     if unseen is None:
         yield "<p>The equations could not be simulated with this recording: it shows what was fitted alone.</p>"
         return

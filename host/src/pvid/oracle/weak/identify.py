@@ -356,7 +356,7 @@ def _checks(
         "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
         "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
         "feedback": lambda: of_feedback(bare, run, fit, own.known),
-        "the residuals": lambda: verdict.of_residuals(found),
+        "the residuals": lambda: verdict.of_residuals(bare, found),
         "the range": lambda: verdict.of_range(bare, fit.p, judged),
         "spoiled windows": lambda: verdict.of_spoiled(rows, fit),
         "the weights of the sensors": lambda: compared(verdict.of_weights, partial(by_sensors, fit)),

@@ -73,6 +73,7 @@ _VISIBLE = 1e-3
 
 # Residuals above this many times what the sensors explain are reported.
 _CHI2 = 2.0
+_CHI2_OF_DRIFT = 10.0  # ... and above this many make what drifts doubtful
 
 _FEW_WINDOWS = 8
 
@@ -443,10 +444,18 @@ def of_weights(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, o
     return [replace(one, alarm=False) for one in reasons]
 
 
-def of_residuals(found: Uncertainty) -> list[Reason]:
-    """Residuals beyond what the sensors explain: a note, as it is not their size that biases p."""
+def of_residuals(model: CompiledModel, found: Uncertainty) -> list[Reason]:
+    """Residuals beyond what the sensors explain: a note, as it is not their size that biases p; far beyond it an alarm
+    for what drifts, as that follows whatever the equations do not explain."""
     if found.chi2 <= _CHI2:
         return []
+    if model.drifts and found.chi2 > _CHI2_OF_DRIFT:
+        names = [model.p_names[k] for k in model.drifting]
+        text = (
+            f"The residuals are {found.chi2:.3g} times what the sensors explain: something else than the drift "
+            f"changed, or the equations lack a term, and {listed(names)} {'follows' if len(names) == 1 else 'follow'} it."
+        )
+        return [Reason("chi2", text, of=of_some(model, model.drifting))]
     text = f"The residuals are {found.chi2:.3g} times what the sensors explain; standard errors are from their scatter."
     return [Reason("chi2", text, alarm=False)]
 
