@@ -453,7 +453,8 @@ def of_residuals(model: CompiledModel, found: Uncertainty) -> list[Reason]:
         names = [model.p_names[k] for k in model.drifting]
         text = (
             f"The residuals are {found.chi2:.3g} times what the sensors explain: something else than the drift "
-            f"changed, or the equations lack a term, and {listed(names)} {'follows' if len(names) == 1 else 'follow'} it."
+            f"changed, or the equations lack a term, and {listed(names)} "
+            f"{'follows' if len(names) == 1 else 'follow'} it."
         )
         return [Reason("chi2", text, of=of_some(model, model.drifting))]
     text = f"The residuals are {found.chi2:.3g} times what the sensors explain; standard errors are from their scatter."
