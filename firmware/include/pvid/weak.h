@@ -191,10 +191,12 @@ static inline pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_wea
  * The work of a window is spread over the ticks of half a window; the work of a tick does not depend on the data. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, const float sample[]);
 
-/* So many ticks at once, of a buffer that a DMA has filled: samples [count][samples], tick by tick. The state is then
- * the same in every bit as behind as many calls of step, for a sixth less instructions. Returns the reason of the last
- * tick with a new estimate (PVID_UPDATED, PVID_MISFIT); if there is none, of the last one with a reason other than
- * PVID_ACCUMULATED and PVID_WARMING_UP; else of the last. count 0: nothing is done. */
+/* So many ticks at once, of a buffer in the units of the model: samples [count][samples], tick by tick. The state is
+ * then the same in every bit as behind as many calls of step. The first stage takes fewer instructions where the
+ * samples are its signals (the pendulum on a Cortex-M4F a sixth); elsewhere it is the same work with one call. Returns
+ * the reason of the last tick with a new estimate (PVID_UPDATED, PVID_MISFIT); if there is none, of the last one with a
+ * reason other than PVID_ACCUMULATED and PVID_WARMING_UP; else of the last: a candidate of an earlier tick may be
+ * hidden. count 0: nothing is done; PVID_ACCUMULATED or PVID_WARMING_UP. */
 pvid_reason pvid_weak_step_block_f32(pvid_weak_f32 *self, const float samples[], uint32_t count);
 
 /* The published estimate, for the context that calls step; the start before the first one. */

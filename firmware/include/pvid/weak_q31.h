@@ -166,7 +166,8 @@ static inline pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_wea
 /* One tick: the readings [samples], taken at the same time. Returns as pvid_weak_step_f32. */
 pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, const int32_t reading[]);
 
-/* So many ticks at once: readings [count][samples]. As pvid_weak_step_block_f32. */
+/* So many ticks at once: readings [count][samples], of which a DMA's counts are an example. The
+ * state and the reason are as of pvid_weak_step_block_f32 (weak.h). */
 pvid_reason pvid_weak_step_block_q31(pvid_weak_q31 *self, const int32_t readings[], uint32_t count);
 
 /* The published estimate, for the context that calls step; the start before the first one. */

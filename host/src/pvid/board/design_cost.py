@@ -23,7 +23,7 @@ from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image
 from pvid.board.mechanism_image_q31 import identifier_of as fixed_identifier_of
 from pvid.board.refined_image import RefinedRun, build_refined_image, light_work
 from pvid.board.replay_image import BLOCK
-from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_weak, figures_of, measured
+from pvid.board.sizes import REFINED, WEAK, WITH_DMA, BuiltImage, Footprint, built_weak, figures_of, measured
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native, weak_native_q31
@@ -89,7 +89,8 @@ class Cost:
     sample_rate : [Hz]
     first_s : time of the first published estimate; of both stages, of the refined one [s]; None: none was replayed
     equal : whether every hash that the board reported is that of the C core on this machine
-    in_blocks : the weak form with samples in blocks of BLOCK: mean of a sample, longest of a block; None: both stages
+    in_blocks : the weak form with samples in blocks of BLOCK: mean of a sample, longest of a block; None: both stages,
+        or a board that is not in WITH_DMA
     refine : settings of the second stage; None: without
     """
 
@@ -212,9 +213,12 @@ def _in_float(
         record = weak_native(compiled, config.design).identifier_of(config).run_samples(run.samples, sums=False)
         first = _first(record.reason)
         run = run.shortened(_enough(first, config.ticks_needed, period, len(run.counts)))
-        images = [built_weak(*build_mechanism_image(asked.board, run, blocks=one), run.name) for one in (False, True)]
-        hashes = identifier_of(run).run_in_blocks(run.samples, BLOCK)
-        return _measured(asked, run.name, images[0], record.hash, first, rate, blocks=(images[1], hashes))
+        built = built_weak(*build_mechanism_image(asked.board, run), run.name)
+        blocks = None
+        if asked.board.name in WITH_DMA:
+            image = built_weak(*build_mechanism_image(asked.board, run, blocks=True), run.name)
+            blocks = image, identifier_of(run).run_in_blocks(run.samples, BLOCK)
+        return _measured(asked, run.name, built, record.hash, first, rate, blocks=blocks)
     both = RefinedRun(run, refine_functions(compiled), refine)
     record_of_both = both.native().run_both(run.samples)
     first = _first(record_of_both.told)
@@ -234,9 +238,12 @@ def _in_fixed_point(asked: Asked, weak: WeakQ31, signals: Run) -> Cost:
     first = _first(record.reason)
     period = weak.config.design.hop * weak.config.design.decimation
     run = run.shortened(_enough(first, weak.ticks_needed, period, len(run.counts)))
-    built = [built_weak(*build_fixed_image(asked.board, run, blocks=one), run.name) for one in (False, True)]
-    hashes = fixed_identifier_of(run).run_in_blocks(run.counts, BLOCK)
-    return _measured(asked, run.name, built[0], record.hash, first, weak.sample_rate, blocks=(built[1], hashes))
+    built = built_weak(*build_fixed_image(asked.board, run), run.name)
+    blocks = None
+    if asked.board.name in WITH_DMA:
+        image = built_weak(*build_fixed_image(asked.board, run, blocks=True), run.name)
+        blocks = image, fixed_identifier_of(run).run_in_blocks(run.counts, BLOCK)
+    return _measured(asked, run.name, built, record.hash, first, weak.sample_rate, blocks=blocks)
 
 
 def _most_ticks(board: Board, bytes_a_tick: int) -> int:
