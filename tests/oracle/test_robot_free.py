@@ -149,8 +149,13 @@ def refused(model: CompiledModel, log: dict[str, Float], sentence: str) -> None:
 
 def test_what_has_no_answer_is_refused(tmp_path: Path) -> None:
     model, log = modelled(tmp_path, thrust=False), log_of(False, 1)
-    refused(model, log | {"pitch": log["pitch"] + 1.5}, "pitch reaches .* turn about one axis")
+    refused(model, log | {"pitch": log["pitch"] + 1.1}, "pitch reaches .* turn about one axis")
+    refused(model, log | {"pitch": 57.3 * log["pitch"]}, "pitch reaches .* is it in degrees")
     refused(model, log | dict.fromkeys(("tau1", "tau2"), 0 * log["x"]), "every torque is 0 at all times")
+    refused(model, log | {"tau2": 0 * log["x"]}, "the torque of joint 2 is 0 in every sample: is it recorded")
+    refused(model, log | {"q1": 0 * log["x"]}, "q1 does not change: move it, or hold it")
+    noise = 1e-5 * np.random.default_rng(0).normal(size=len(log["x"]))
+    refused(model, log | {"q1": noise}, "q1 is nowhere clear of a standstill")
     wrapped = answered(model, log | {"yaw": np.mod(log["yaw"], 2 * math.pi)}).fit.p
     assert wrapped == pytest.approx(answered(model, log).fit.p, rel=1e-6)
     bare = (tmp_path / "robot.py").read_text().split("inertial=(0.4")[0].rstrip().rstrip(",") + ")\n"
@@ -178,5 +183,5 @@ def test_the_first_link_of_urdf_is_free_on_request(tmp_path: Path) -> None:
             for arguments in (["model", "build"], ["design", "--duration", "20", "--model"]):
                 refused = CliRunner().invoke(commands, [*arguments, str(tmp_path / "flyer.py"), "-o", "out"])
                 assert isinstance(refused.exception, PvidError) and "free" in str(refused.exception)
-            assert "1 joints on a free base, 19 base parameters" in made.output
+            assert "1 joint on a free base, 19 base parameters" in made.output
             assert (joints[5].inertial or ())[:4] == pytest.approx((3, 0.3, 0, 0)) and joints[6].parent == 5

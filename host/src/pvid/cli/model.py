@@ -73,8 +73,8 @@ def from_file(path: Path, out: Path, joints: tuple[str, ...], free_base: bool) -
         write_stderr(f"pvid: note: {note}")
     write_whole(out, text_of(robot, path, out.parent))
     compiled = compiled_of(out)
-    base = " on a free base" if robot.free else ""
-    click.echo(f"{out}: {len(robot.joints) - robot.free} joints{base}, {len(compiled.unknowns)} base parameters")
+    assert compiled.chain is not None
+    click.echo(f"{out}: {compiled.chain.extent}, {len(compiled.unknowns)} base parameters")
     return DONE
 
 

@@ -119,7 +119,9 @@ def sentence(series: Series, change: Change) -> str:
     how = f"{'rose' if change.after > change.before else 'fell'}"
     size = f" by {percent(abs(change.part))}" if np.isfinite(change.part) else ""
     step = change.kind == "step"
-    when = f"{'between' if step else 'steadily from'} {_dates(change.start, change.end, ' and ' if step else ' to ')}"
+    joint = " and " if step else " to "
+    dates = _dates(change.start, change.end, joint)
+    when = f"{('between' if step else 'steadily from') if joint in dates else 'on'} {dates}"
     return f"{series.board}: {series.name} {how}{size} ({before} to {after}{' ' + unit if unit else ''}) {when}"
 
 

@@ -122,10 +122,6 @@ class RobotAnswer(Answer):
                     of=tuple(names[k] for k in moved),
                 )
             )
-        idle = [chain.number(k) for k in fit.run.idle if k >= chain.free]
-        if idle:
-            text = f"the torque of joint {listed(map(str, idle))} is 0 at all times: taken as driven by nothing"
-            reasons.append(Reason("sensor", text, alarm=False))
         weak = [one.name for one in self.prediction if one.r2 < _EXPLAINED]
         if weak:  # the rates' noise may be all that is not explained
             pieces = zip(fit.predicted(fit.run, fit.p[np.newaxis]), fit.predicted(fit.run, fit.p[np.newaxis], 0),

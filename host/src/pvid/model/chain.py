@@ -116,6 +116,12 @@ class Chain:
         """How many joints are of a free base: 6 or 0."""
         return sum(one.free for one in self.joints)
 
+    @property
+    def extent(self) -> str:
+        """As in "3 joints on a free base"."""
+        n = len(self.joints) - self.free
+        return f"{n} joint{'' if n == 1 else 's'}{' on a free base' if self.free else ''}"
+
     def number(self, joint: int) -> int:
         """Of a joint, from 1; the body of a free base has 0."""
         return joint + 1 - self.free

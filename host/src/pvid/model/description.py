@@ -241,6 +241,8 @@ class Model:
         for name, meaning in meanings.items():
             if name not in known:
                 raise self._refused(f"words: {name} is no parameter that is declared above")
+            if not isinstance(meaning, str):
+                raise self._refused(f"words: {name} is a few words, not {meaning}")
             self.meanings[name] = _plain(meaning)
 
     # ---- equations

@@ -30,12 +30,11 @@ def robot_report(compiled: CompiledModel) -> str:
     """The same of a robot: its base parameters in closed form, with their values in its file."""
     chain = compiled.chain
     assert chain is not None
-    base = " on a free base" if chain.free else ""
     names = {chain.standard[place].name for one in chain.base for place, _ in one.parts}
     none = [one.name for one in chain.standard if one.name not in names]
     program, _ = chain.program([one.standard for one in chain.base])
     lines = [
-        f"{compiled.title}: {len(chain.joints) - chain.free} joints{base}, {len(chain.base)} base parameters, "
+        f"{compiled.title}: {chain.extent}, {len(chain.base)} base parameters, "
         f"{chain.inertial} of them of the bodies; {program.cost} a sample.",
         "Identifiable: all base parameters, given enough excitation. A parameter with _R is a combination:",
         "",

@@ -341,7 +341,7 @@ def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> tuple
     joints = [names.index(one) for one in chosen] if chosen else [
         k for k in range(model.njnt) if k not in free and k not in base]  # fmt: skip
     if not joints and not base:
-        raise PvidError(f"{path}: no joint moves")
+        raise PvidError(f"{path}: no joint moves; --free-base: its first link is fixed to nothing")
     for place, joint in enumerate(joints):
         if any(_is_under(model, one, joint) for one in joints[:place]):
             raise PvidError(f"{path}: {printable(names[joint])} carries a joint before it in the list: name it first")

@@ -125,6 +125,11 @@ class RobotRun:
                 positions.append(np.unwrap(q) if joint in (3, 5) and joint < self.chain.free else q)
             if self.chain.free:
                 upright = float(np.max(np.abs(positions[4])))
+                if upright > math.pi / 2:
+                    raise PvidError(
+                        f"pitch reaches {upright:.3g}, and is at most pi/2 rad: is it in degrees? "
+                        "--columns pitch=pitch:deg"
+                    )
                 if upright > _UPRIGHT:
                     raise PvidError(
                         f"pitch reaches {math.degrees(upright):.0f} degrees, where yaw and roll turn about one axis: "
@@ -144,6 +149,11 @@ class RobotRun:
         self.idle = [k for k, one in enumerate(driven) if not one]
         if self.torques and not any(driven):
             raise PvidError("every torque is 0 at all times: a motion without a known force has no parameters")
+        if self.torques and (still := [k for k in self.idle if k >= self.chain.free]):
+            raise PvidError(
+                f"{self.chain.force(still[0])} is 0 in every sample: is it recorded? A joint that nothing drives can "
+                "be held, and left out of `pvid model from --joints`"
+            )
 
     @cached_property
     def design(self) -> RobotDesign:
@@ -439,14 +449,20 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     Raises PvidError when the run is too short.
     """
     whole = RobotRun(model, run, sample_rate)
+    for k in range(len(whole.chain.joints)):
+        if whole.positions and not any(np.ptp(one[k]) for one in whole.positions):
+            raise PvidError(
+                f"{whole.chain.position(k)} does not change: move it, or hold it and leave it out of `pvid model from "
+                "--joints`"
+            )
     columns = tuple(one.standard for one in whole.chain.base)
     rows = RobotRows.of(whole, columns)
     functions = whole.design.functions
     for k, one in enumerate(rows.white(np.array([np.eye(functions.count)] * len(rows.known))).free):
         if one < _DIRECTION:
             raise PvidError(
-                f"q{k + 1} is nowhere clear of a standstill for a window of {functions.length:.3g} s: move this joint "
-                "faster, for longer in one direction, or with an encoder of more bits"
+                f"{whole.chain.position(k)} is nowhere clear of a standstill for a window of {functions.length:.3g} s: "
+                "move this joint faster, for longer in one direction, or with an encoder of more bits"
             )
     grams = np.array([functions.gram(m, m) for m in range(3)])
     traces = np.trace(grams, axis1=1, axis2=2)[:, np.newaxis, np.newaxis]
