@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import motor_run
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -146,3 +147,26 @@ def test_a_force_holds_a_parameter_at_its_bound_and_pulls_it_off() -> None:
 @pytest.mark.parametrize(("value", "expected"), [(-1.0, 1.95996), (0.0, 1.95996), (5.0, 6.64485)])
 def test_upper_bound_is_that_of_a_normal_distribution_cut_at_0(value: float, expected: float) -> None:
     assert upper_bound(2 * value, 2.0) == pytest.approx(2 * expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("guess", [0.02, 0.15])
+def test_of_a_common_scale_that_is_free_nothing_has_a_bound(guess: float) -> None:
+    """J w' + b w = kt i: the run determines J/kt and b/kt alone, and kt is not "below" anything."""
+    model = Model("motor")
+    v, i, w = (
+        model.input("V", "V", hold="zoh"),
+        model.sensor("i", "A", noise=0.01),
+        model.sensor("w", "rad/s", noise=0.05),
+    )
+    ell, r, ke = model.unknown("L", "H", 3e-3), model.unknown("R", "ohm", 1.5), model.unknown("ke", "V*s", 0.04)
+    kt, j, b = (
+        model.unknown("kt", "N*m/A", guess),
+        model.unknown("J", "kg*m^2", 1e-4),
+        model.unknown("b", "N*m*s", 1e-4),
+    )
+    model.equation(ell * i.d() + r * i + ke * w - v)
+    model.equation(j * w.d() + b * w - kt * i)
+    found = identify(model.compiled("motor"), motor_run.recording().run, 1000.0)
+    status = dict(zip(("L", "R", "ke", "kt", "J", "b"), [one.status for one in found.judged], strict=True))
+    assert [name for name, one in status.items() if one == "not_identified"] == ["kt", "J", "b"]
+    assert [name for name, one in status.items() if one == "identified"] == ["L", "R", "ke"]

@@ -111,7 +111,8 @@ def identify_strong_mechanism(
     core : f32, q31; f64: the analysis
     """
     refuse_constant(recording, model)
-    reference = reference_of(attempted(lambda: analysed(recording, model).found))
+    weak = attempted(lambda: analysed(recording, model).found)
+    reference = reference_of(weak)
     fixed = strong_design_to_identify(model, recording, law, reference) if core == STRONG_FIXED.name else None
     design = strong_design(model, recording, law, reference) if fixed is None else fixed.base
     fitted = design.fitted
@@ -137,7 +138,9 @@ def identify_strong_mechanism(
     held = None if identified else "the strong form does not determine every parameter"
     judged = unless_held([Judged()] * len(p), held)
     # What another window or the weak form changes is common to all parameters, as a gain is.
-    verdict = Verdict(tuple(_doubts(model, p, design, noise, unknown, held)))
+    found = () if weak is None else zip(model.p_names, weak.judged, strict=True)
+    lost = [name for name, one in found if one.status == "not_identified"]
+    verdict = Verdict((*_doubts(model, p, design, noise, unknown, held), *_not_in_weak(lost, unknown)))
     shared = np.stack([fitted.change, fitted.bias])
     values = values_of(model, p, np.diag(noise**2), shared, judged, verdict, of_known=False)
     return StrongAnswer(model, design, values, core, reason, running, verdict, unknown, recording)
@@ -156,6 +159,16 @@ def _unknown(model: CompiledModel, p: Float, error: Float) -> Iterator[str]:
         rim = 1e-5 * abs(value) if one.positive else 0.0
         if not own <= bound or value <= one.low + rim or value >= one.high - rim:
             yield one.name
+
+
+def _not_in_weak(lost: list[str], unknown: tuple[str, ...]) -> Iterator[Doubt]:
+    """Of parameters that the weak form does not determine from the same recording."""
+    if kept := [one for one in lost if one not in unknown]:
+        text = (
+            f"The weak form does not determine {listed(kept)} from this recording: the strong form may have them from "
+            "the bias of its noise alone."
+        )
+        yield Doubt("noise", text, of=tuple(kept))
 
 
 def _doubts(

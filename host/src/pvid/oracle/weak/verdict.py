@@ -65,6 +65,7 @@ ParameterStatus = Literal["identified", "near_zero", "not_identified"]
 _UNKNOWN_OF_RANGE = 0.5
 _COLLAPSED = 1e-6  # of its guess: a value that no mechanism has, whatever its error
 _NEXT_TO_0 = 1e-3  # of its guess: a value and an error of it that mean 0
+_TIED = 0.98  # correlation of two that are determined up to a common factor
 
 # Two estimates disagree if they differ by so many standard errors of the difference ...
 _CLASH = 4.0
@@ -229,6 +230,23 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
     known = [one.status == "identified" for one in out]
     if not any(known):  # all at 0: the equations do not describe the run
         return [replace(one, status="not_identified") for one in out]
+    return _without_scale(model, fit, out)
+
+
+def _without_scale(model: CompiledModel, fit: Fit, found: Sequence[Judged]) -> list[Judged]:
+    """What may be 0 has no bound where it grows together with what is not determined: their common scale is free."""
+    out = list(found)
+    lost = [k for k, one in enumerate(out) if one.status == "not_identified"]
+    small = [k for k, one in enumerate(out) if one.status == "near_zero"]
+    covariance = attempted(lambda: uncertainty(fit).covariance) if lost and small else None
+    if covariance is None:
+        return out
+    sd = np.sqrt(np.diag(covariance))
+    for k in small:
+        tied = [one for one in lost if covariance[k, one] > _TIED * sd[k] * sd[one]]
+        if tied:
+            other = model.unknowns[tied[0]].name
+            out[k] = Judged("not_identified", f"{model.unknowns[k].name} and {other} grow together", has_error=True)
     return out
 
 
