@@ -14,6 +14,7 @@ import pvid
 from pvid.base.errors import PvidError
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.weak import config_to_identify, samples_of
+from pvid.identification.advice import advised
 from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
 from pvid.identification.core import identify_in_c
@@ -317,6 +318,15 @@ def test_the_report_has_the_course_and_says_why_no_motion_is_predicted() -> None
     page = report(hot(), Made("pvid identify hot.csv"))
     assert "Drifted, the values are those of the end: " in page and "(± standard errors)." in page
     assert "Parameters may drift: one set of values predicts no motion." in page
+
+
+def test_where_a_drift_cannot_be_followed_the_reasons_are_those_of_parameters_that_stay() -> None:
+    run = cut(heated_run()[0], 6000)
+    turned = replace(run, signals={**run.signals, "w": -run.signals["w"]})
+    answer = advised(analysed(turned, heating()))
+    assert any("--columns w=w:-1" in one for one in answer.advice)
+    assert "The drift cannot be followed" in (answer.found.verdict.warning or "") and answer.found.drifted is None
+    assert len({one.word for one in answer.values.values()} & {"good"}) == 0
 
 
 def test_several_recordings_have_no_course() -> None:

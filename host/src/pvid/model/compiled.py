@@ -349,7 +349,7 @@ class CompiledModel:
             kind = "a drift of" if self.drifts else "constraints between"
             raise PvidError(
                 f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in float64 and "
-                "float32 does"
+                f"float32 does{'' if self.drifts else ', and `--form strong --core f64`'}"
             )
 
     def refuse_robot(self, what: str = "this command") -> None:

@@ -283,9 +283,10 @@ class Model:
 
         Parameters
         ----------
-        rates : unknown -> its change by one unit of what drifts, in unknowns and known constants:
-            {R: alpha*R, k: -beta*k}. An unknown in no equation may be among them, as the temperature's rise: it begins
-            at its guess, within sd.
+        rates : unknown -> its change by one unit of what drifts, in unknowns and known constants. An unknown in no
+            equation may be among them, as the temperature's rise: it begins at its guess, within sd. With it copper is
+            linear: {R: alpha*R/(1 + alpha*rise), k: -beta*k/(1 - beta*rise), rise: 1}. {R: alpha*R, k: -beta*k} is
+            exponential in temperature, and holds for a few kelvin
         memory_s : time constant of what the rows tell along it [s], as short as the noise allows; one for all drifts
         """
         title = f"drift {len(self.drifts) + 1}"

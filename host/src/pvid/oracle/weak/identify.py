@@ -138,6 +138,8 @@ _NOT_REWEIGHTED = (
     "those of the sensors' weights alone (--weights sensors)."
 )
 
+_NOT_FOLLOWED = "The drift cannot be followed: values and reasons are those of parameters that do not drift."
+
 # Of the work that is allowed to the search for a design: that of the rest where it finds a plausible estimate, terms
 # that are missing included, where it finds none, and where the equations explain nothing of a row.
 _OF_KNOWN, _OF_UNKNOWN, _OF_HOPELESS = 1.5, 0.8, 0.1
@@ -195,8 +197,13 @@ def identify(
             with work.limited(units):
                 ranking = tuple(ranked(ready(compiled), run, sample_rate, begun, with_error))
         used = ranking[0].design if design is None else design
-        if compiled.drifts:
-            compiled, begun = with_drift(compiled, run, used, begun, with_error)
+        if compiled.drifts and (followed := attempted(partial(with_drift, compiled, run, used, begun, with_error))):
+            compiled, begun = followed
+        elif compiled.drifts:
+            stays = replace(compiled, drifts=(), drifted=None)
+            found = identify(stays, run, sample_rate, start, design, compensate, weights)
+            reasons = (*found.verdict.reasons, Reason("not_settled", _NOT_FOLLOWED))
+            return replace(found, verdict=Verdict(verdict.sorted_by_gravity(reasons)))
     if not ranking:
         return _judged(compiled, run, used, begun, None, compensate, with_error, units)
     share = _OF_HOPELESS if ranking[0].is_hopeless else _OF_KNOWN if ranking[0].known else _OF_UNKNOWN
