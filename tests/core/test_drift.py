@@ -19,6 +19,7 @@ from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
 from pvid.identification.core import identify_in_c
 from pvid.identification.summary import Made
+from pvid.identification.validation import validated
 from pvid.model import Model
 from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
@@ -318,6 +319,16 @@ def test_the_report_has_the_course_and_says_why_no_motion_is_predicted() -> None
     page = report(hot(), Made("pvid identify hot.csv"))
     assert "Drifted, the values are those of the end: " in page and "(± standard errors)." in page
     assert "Parameters may drift: one set of values predicts no motion." in page
+
+
+@pytest.mark.parametrize("constants", [1, 2])
+def test_what_only_drifts_is_no_parameter_of_a_prediction(constants: int) -> None:
+    """The rise of the temperature is in no equation; both constants of the motor are tied."""
+    model, cold = heating(constants=constants), cut(heated_run()[0], 6000)
+    truth = {"R": 1.2, "L": 2e-3, "k": 0.06, "kt": 0.06, "J": 1.5e-4, "b": 2e-4, "rise": 0.0}
+    p = np.array([truth[one] for one in model.p_names])
+    found = [float(one.times_noise) for one in validated(model, cold, p, 0.05).sensors]
+    assert found == pytest.approx([1.0, 1.0], abs=0.03)
 
 
 def test_where_a_drift_cannot_be_followed_the_reasons_are_those_of_parameters_that_stay() -> None:

@@ -390,7 +390,8 @@ class _Refine:
         moved = {symbol for i in self._moving_equations() for symbol in equations[i].free_symbols}
         shapes = [one for one in own.shapes if one in used]
         behind = {symbol for one in shapes for symbol in own.shapes[one].free_symbols}
-        every = [*(one.symbol for one in model.unknowns), *(one.symbol for one in own.extras)]
+        unknowns = (one.symbol for one in model.unknowns if one.symbol not in model.anchors)  # of a drift: no motion's
+        every = [*unknowns, *(one.symbol for one in own.extras)]
         direct = [one for one in every if one in moved]
         hidden = [one for one in every if one in behind and one not in direct]
         if len(hidden) != len(shapes):

@@ -220,10 +220,12 @@ class Problem:
     def _ties_at(self, r: Float, free: npt.NDArray[np.intp] | slice = slice(None)) -> tuple[Float, Float]:
         """The step back to the constraints, and a base of the steps that keep them, of the free entries of r."""
         assert self._ties is not None
-        places = self.kernel.made.places_of_p
-        g, of_p = self._ties.constraints(r[places])
+        made, p = self.kernel.made, self._ties.guess.copy()
+        own = sorted(one.place for one in made.parameters if one.place >= 0)  # what only drifts is no parameter of it
+        p[own] = r[made.places_of_p]
+        g, of_p = self._ties.constraints(p)
         a = np.zeros((len(g), self.n))
-        a[:, places] = of_p
+        a[:, made.places_of_p] = of_p[:, own]
         left, sizes, right = np.linalg.svd(a[:, free])
         rank = int(np.sum(sizes > REDUNDANT))
         return -right[:rank].T @ ((left[:, :rank].T @ g) / sizes[:rank]), right[rank:].T
