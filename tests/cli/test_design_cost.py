@@ -58,7 +58,8 @@ def test_the_cost_of_a_shipped_rig_is_that_of_sizes() -> None:
     (found,) = json.loads(pvid("design", "--model", "rigid_body", "--on", BOARD, "--json").stdout)["cost"]
     footprint, _ = sizes.measure(sizes.Configuration(BOARDS[BOARD], sizes.WEAK, "f32", "rigid_body"))
     expected = sizes.figures_of(footprint)
-    assert found["state"] == expected["state"] and found["tables"] == expected["tables"]
+    shared = 4 * 6 * 7 // 2  # the triangle of 6 parameters' errors that all windows share, which `sizes` is without
+    assert found["state"] == expected["state"] and found["tables"] == expected["tables"] + shared
     assert found["mean"] == pytest.approx(expected["mean"], rel=0.02)  # of other windows
     assert found["longest"] == pytest.approx(expected["longest"], rel=0.02)
 
