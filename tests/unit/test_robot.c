@@ -455,8 +455,10 @@ static void what_is_out_of_range_is_refused_by_its_status(void **state)
     config.group = 3;
     refuse(&config, PVID_BAD_WINDOW);
     config = config_of();
-    config.group = 1;
+    config.group = 4; /* 14 stages need 5 intervals: of 5 ticks one is for the row and one is spare */
     refuse(&config, PVID_BAD_WINDOW);
+    config.group = 5;
+    assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
     config.group = 0;
     refuse(&config, PVID_BAD_WINDOW);
     static const float infinite[P] = {0.0f, INFINITY, 0.0f, 0.0f};
