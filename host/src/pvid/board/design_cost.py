@@ -26,7 +26,6 @@ from pvid.board.replay_image import BLOCK
 from pvid.board.sizes import REFINED, WEAK, WITH_DMA, BuiltImage, Footprint, built_weak, figures_of, measured
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import refine_functions
-from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.codegen.weak_q31 import WeakQ31
 from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
 from pvid.configuration.weak import (
@@ -210,7 +209,7 @@ def _in_float(
     run = run_of_samples(compiled, config, samples[: _most_ticks(asked.board, 4 * samples.shape[1])])
     rate, period = config.sample_rate, config.design.hop * config.design.decimation
     if refine is None:
-        record = weak_native(compiled, config.design).identifier_of(config).run_samples(run.samples, sums=False)
+        record = identifier_of(run).run_samples(run.samples, sums=False)
         first = _first(record.reason)
         run = run.shortened(_enough(first, config.ticks_needed, period, len(run.counts)))
         built = built_weak(*build_mechanism_image(asked.board, run), run.name)
@@ -233,8 +232,7 @@ def _in_fixed_point(asked: Asked, weak: WeakQ31, signals: Run) -> Cost:
     counts = weak.counts_of(signals)
     run = FixedRun(weak, counts, 0)
     run = replace(run, counts=counts[: _most_ticks(asked.board, run.count_bytes * counts.shape[1])])
-    identifier = weak_native_q31(weak.made, weak.parameters, weak.config).identifier()
-    record = identifier.run_samples(run.counts, sums=False)
+    record = fixed_identifier_of(run).run_samples(run.counts, sums=False)
     first = _first(record.reason)
     period = weak.config.design.hop * weak.config.design.decimation
     run = run.shortened(_enough(first, weak.ticks_needed, period, len(run.counts)))

@@ -24,7 +24,7 @@ from pvid.identification.analysis import analysed, own_of
 from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
-from pvid.identification.summary import Made, head, summary
+from pvid.identification.summary import Made, head, meaning_of, summary
 from pvid.log.rig import source_of
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
@@ -458,7 +458,7 @@ def table_of(values: Mapping[str, Value], title: str, meanings: Mapping[str, str
         column.justify = "right"
     for name, one in values.items():
         label = escape(f"{name} [{one.unit}]" if one.unit else name)
-        more = [meanings.get(name.partition("[")[0], "")] if meanings else []
+        more = [meaning_of(name, meanings)] if meanings else []
         more += [one.word] if doubted else []
         if one.value is None or one.se is None or one.se_noise is None:
             table.add_row(label, "not determined", *[""] * (len(names) - 2), *more)

@@ -119,9 +119,9 @@ def sentence(series: Series, change: Change) -> str:
     how = f"{'rose' if change.after > change.before else 'fell'}"
     size = f" by {percent(abs(change.part))}" if np.isfinite(change.part) else ""
     step = change.kind == "step"
-    joint = " and " if step else " to "
-    dates = _dates(change.start, change.end, joint)
-    when = f"{('between' if step else 'steadily from') if joint in dates else 'on'} {dates}"
+    between = " and " if step else " to "
+    dates = _dates(change.start, change.end, between)
+    when = f"{('between' if step else 'steadily from') if between in dates else 'on'} {dates}"
     return f"{series.board}: {series.name} {how}{size} ({before} to {after}{' ' + unit if unit else ''}) {when}"
 
 

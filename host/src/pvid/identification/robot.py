@@ -110,7 +110,7 @@ class RobotAnswer(Answer):
             unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")
             number = chain.number(one.joint)
             size = _WORDS[one.law].format(size=with_unit(one.size, unit, 3), joint=number)
-            text = f"{chain.force(one.joint)} has what the equations lack, {size}"
+            text = f"the {chain.force(one.joint)} has what the equations lack, {size}"
             if moved:
                 k = moved[0]
                 text += f"; with that {names[k]} would be {fit.p[k] + one.shift[k]:.4g} in place of {fit.p[k]:.4g}"
@@ -131,8 +131,7 @@ class RobotAnswer(Answer):
             weak = [one.name for one, sd in zip(self.prediction, noise, strict=True)
                     if one.r2 < _EXPLAINED and one.rms > _NOISY * sd]  # fmt: skip
         if weak:
-            loose = chain.free > 0 and 0 in fit.run.idle
-            outside = ", or what touches the base: the ground, thrust (wrench=True)" if loose else ""
+            outside = ", or what touches the base: the ground, thrust (wrench=True)" if 0 in fit.run.idle else ""
             text = (
                 f"less than {_EXPLAINED:.0%} of {listed(weak)} is explained on unseen motion: check signs, units, gear "
                 f"ratios and the order of the joints, or a drive that bends{outside}"
@@ -358,6 +357,6 @@ def torques_of(
             continue
         part = float(np.sqrt(left[k] / max(moved[k], 1e-300)))
         rms = float(np.sqrt(left[k] / size))
-        name = f"tau{chain.number(k)}" if k >= chain.free else chain.force(k).removeprefix("the ")
+        name = f"tau{chain.number(k)}" if k >= chain.free else chain.force(k)
         out.append(SensorPrediction(name, "N" if joint.prismatic else "N*m", rms, part, None))
     return tuple(out)

@@ -9,7 +9,7 @@ import math
 import re
 import shlex
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -115,6 +115,11 @@ def unit_for(largest: float, unit: str) -> tuple[str, float]:
     if _POWERS[0] <= power <= _POWERS[1]:
         return printed_unit(unit), scale
     return f"×10{raised(power)} {printed_unit(unit)}".strip(), scale * 10.0**power
+
+
+def meaning_of(name: str, meanings: Mapping[str, str]) -> str:
+    """Of a parameter, that of one recording included (`m[2]`); "": none is given."""
+    return meanings.get(name.partition("[")[0], "")
 
 
 class WithInterval(Protocol):

@@ -34,6 +34,8 @@ _STATES = 60  # random ones, whose rows decide what depends on what
 # Of a free base: where its body's frame is in the inertial one (turned by yaw about z, then pitch about y, then roll
 # about x), and the force and the moment about its origin that act on the body from outside, in its frame.
 POSE, WRENCH = ("x", "y", "z", "yaw", "pitch", "roll"), ("fx", "fy", "fz", "mx", "my", "mz")
+POSE_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+SLIDING = 3  # of both, the first ones: along the axes; the others about them
 
 
 @dataclass(frozen=True)
@@ -133,8 +135,8 @@ class Chain:
     def force(self, joint: int) -> str:
         """What acts along a joint, in words."""
         if joint >= self.free:
-            return f"the torque of joint {self.number(joint)}"
-        return f"the {'force along' if self.joints[joint].prismatic else 'moment about the axis of'} {POSE[joint]}"
+            return f"torque of joint {self.number(joint)}"
+        return f"{'force along' if joint < SLIDING else 'moment about the axis of'} {POSE[joint]}"
 
     @cached_property
     def standard(self) -> tuple[Standard, ...]:

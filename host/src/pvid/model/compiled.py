@@ -343,13 +343,21 @@ class CompiledModel:
         """Places in p of what drifts."""
         return [k for k in range(len(self.p)) if any(way[k] != 0 for way in self.drifts)]
 
-    def refuse_constraints(self, what: str) -> None:
-        """PvidError where there are any, or drifts, by what keeps none."""
-        if self.constraints or self.drifts:
-            kind = "a drift of" if self.drifts else "constraints between"
+    def refuse_drifts(self, what: str) -> None:
+        """PvidError where there are any, by what follows none."""
+        if self.drifts:
             raise PvidError(
-                f"{self.name} has {kind} its unknowns, which {what} does not keep: the weak form in float64 and "
-                f"float32 does{'' if self.drifts else ', and `--form strong --core f64`'}"
+                f"{self.name} has a drift of its unknowns, which {what} does not keep: the weak form in float64 and "
+                "float32 does"
+            )
+
+    def refuse_constraints(self, what: str) -> None:
+        """PvidError where there are any, or drifts, by what keeps neither."""
+        self.refuse_drifts(what)
+        if self.constraints:
+            raise PvidError(
+                f"{self.name} has constraints between its unknowns, which {what} does not keep: the weak form in "
+                "float64 and float32 does, and `--form strong --core f64`"
             )
 
     def refuse_robot(self, what: str = "this command") -> None:

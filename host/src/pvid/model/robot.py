@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import sympy as sp
 
-from pvid.model.chain import INERTIAL, POSE, WRENCH, Base, Chain, Joint, rotation_of
+from pvid.model.chain import INERTIAL, POSE, POSE_AXES, SLIDING, WRENCH, Base, Chain, Joint, rotation_of
 from pvid.model.compiled import CompiledModel, Unknown
 from pvid.model.description import Model
 
@@ -65,15 +65,14 @@ class Robot(Model):
         if self.joints:
             raise self._refused(f"{name}: a free base comes before all joints, and once")
         given = self._inertial(name, inertial)
-        for k, pose in enumerate(POSE):
-            slides = k < 3
+        for k, (pose, axis) in enumerate(zip(POSE, POSE_AXES, strict=True)):
+            slides = k < SLIDING
             self.sensor(pose, "m" if slides else "rad", resolution=resolution[not slides], reach=math.pi, gain_sd=0.0)
-            axis = [float(k % 3 == (place if slides else 2 - place)) for place in range(3)]
             self.joints.append(
                 Joint(
                     name if k == len(POSE) - 1 else f"{name}_{pose}",
                     k - 1,
-                    (axis[0], axis[1], axis[2]),
+                    axis,
                     (0.0, 0.0, 0.0),
                     rotation_of((0.0, 0.0, 0.0)),
                     prismatic=slides,
@@ -82,7 +81,7 @@ class Robot(Model):
                 )
             )
         for k, one in enumerate(WRENCH if wrench else ()):
-            self.input(one, "N" if k < 3 else "N*m", hold=hold, reach=100.0)
+            self.input(one, "N" if k < SLIDING else "N*m", hold=hold, reach=100.0)
 
     def joint(
         self,
@@ -200,24 +199,18 @@ class Robot(Model):
     def _inertial(self, name: str, given: Sequence[float] | None) -> tuple[float, ...] | None:
         if given is None:
             return None
-        try:
-            out = tuple(float(one) for one in given)
-        except (TypeError, ValueError):
-            out = ()
-        if len(out) != len(INERTIAL) or not np.isfinite(out).all():
+        out = _finite(given, len(INERTIAL))
+        if out is None:
             raise self._refused(f"{name}: inertial has {len(INERTIAL)} numbers: {', '.join(INERTIAL)}")
         return out
 
     def _two(self, what: str, given: Sequence[float] | None) -> tuple[float, float] | None:
         if given is None:
             return None
-        try:
-            one, other = (float(each) for each in given)
-        except (TypeError, ValueError):
-            one = other = math.nan
-        if not (math.isfinite(one) and math.isfinite(other)):
+        out = _finite(given, 2)
+        if out is None:
             raise self._refused(f"{what}: two finite numbers are needed, not {given}")
-        return one, other
+        return out[0], out[1]
 
     def _positive(self, what: str, given: float | None) -> float | None:
         if given is None:
@@ -231,13 +224,19 @@ class Robot(Model):
         return value
 
     def _three(self, what: str, given: Sequence[float]) -> tuple[float, float, float]:
-        try:
-            x, y, z = (float(one) for one in given)
-        except (TypeError, ValueError):
-            x = y = z = math.nan
-        if not math.isfinite(x + y + z):
+        out = _finite(given, 3)
+        if out is None:
             raise self._refused(f"{what} has three numbers, not {given}")
-        return x, y, z
+        return out[0], out[1], out[2]
+
+
+def _finite(given: Sequence[float], count: int) -> tuple[float, ...] | None:
+    """So many finite numbers; None: it is something else."""
+    try:
+        out = tuple(float(one) for one in given)
+    except (TypeError, ValueError):
+        return None
+    return out if len(out) == count and np.isfinite(out).all() else None
 
 
 def _unknown(chain: Chain, base: Base) -> Unknown:

@@ -20,8 +20,7 @@ def strong_form(compiled: CompiledModel) -> CompiledModel:
     Where an elimination differentiates sgn(..) or |..|, an auxiliary signal of `opaque` replaces it, and its jets in
     the rows are its derivatives.
     """
-    if compiled.drifts:
-        compiled.refuse_constraints("the strong form")
+    compiled.refuse_drifts("the strong form")
     integrals = {jet: value for jet, value in compiled.opaque.items() if value.has(Integral)}
     rates = {jet.of: total_derivative(value) for jet, value in integrals.items()}
     definitions = {jet.d() - rates[jet.of] for jet in integrals}

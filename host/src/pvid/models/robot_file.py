@@ -17,7 +17,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.packages import lacking
 from pvid.base.wording import listed, printable, reason
-from pvid.model.chain import POSE
+from pvid.model.chain import POSE, POSE_AXES, SLIDING
 from pvid.model.robot import MOST_JOINTS
 
 Float = npt.NDArray[np.float64]
@@ -28,7 +28,6 @@ _LEAST_SECOND, _ROUGH = 1e-12, 1e-6  # [kg*m^2]; of the largest second moment
 _LOCKED = 1e-6  # cosine of the pitch below which roll and yaw turn about one axis
 _LEAST_MASS = 1e-11  # [kg]
 _SLIDES = 2  # mjJNT_SLIDE
-_SLIDES_FREE = 3  # of POSE
 _INERTIAL = "inertial"  # link and joint that are put before a free base of URDF
 
 
@@ -104,8 +103,8 @@ def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True, free_b
     fused : links of URDF that fixed joints tie are one body
     free_base : the first link of URDF is fixed to nothing, as it is where a joint says so
     """
-    mujoco, model, speeds, notes, bare = _read(path, chosen, fused=fused, free_base=free_base)
-    first, joints = _chosen(mujoco, model, path, chosen)
+    mujoco, model, base, speeds, notes, bare = _read(path, chosen, fused=fused, free_base=free_base)
+    joints = [*base, *_chosen(mujoco, model, path, chosen, base)]
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr] = 0.0
     mujoco.mj_kinematics(model, data)
@@ -118,8 +117,8 @@ def placed(path: Path, chosen: Sequence[str] = (), *, fused: bool = True, free_b
     ]  # fmt: skip
     frames = [(data.xanchor[k].copy(), data.xmat[int(model.jnt_bodyid[k])].reshape(3, 3)) for k in joints]
     names = [_names(model)[joint] for joint in joints]
-    base = (np.zeros(3), np.eye(3))
-    return Placed(model, data, speeds, notes, bare, joints, names, first, before, carrier, [*frames, base])
+    frames.append((np.zeros(3), np.eye(3)))
+    return Placed(model, data, speeds, notes, bare, joints, names, len(base), before, carrier, frames)
 
 
 def model_text(path: Path, chosen: Sequence[str] = (), folder: Path | None = None) -> str:
@@ -177,9 +176,9 @@ def text_of(robot: Placed, path: Path, folder: Path | None = None) -> str:
 
 def _read(
     path: Path, chosen: Sequence[str], *, fused: bool, free_base: bool
-) -> tuple[Any, Any, dict[str, float], list[str], list[str]]:
-    """MuJoCo, its model of a file, and what `prepared_urdf` returns of URDF; what is only drawn is not needed
-    of URDF."""
+) -> tuple[Any, Any, list[int], dict[str, float], list[str], list[str]]:
+    """MuJoCo, its model of a file, the joints of a free base, and what `prepared_urdf` returns of URDF; what is only
+    drawn is not needed of URDF."""
     try:
         import mujoco
     except ImportError:
@@ -211,18 +210,20 @@ def _read(
     try:
         urdf = ElementTree.tostring(tree, encoding="unicode") if tree.tag == "robot" else None
         model = mujoco.MjModel.from_xml_string(urdf) if urdf else mujoco.MjModel.from_xml_path(str(path))
+        base: list[int] = []
         if (joint := _free_joint(mujoco, model, path, chosen)) is not None:
             spec = mujoco.MjSpec.from_string(urdf) if urdf else mujoco.MjSpec.from_file(str(path))
             spec.compile()
-            _split(mujoco, spec, joint)
+            names = _split(mujoco, spec, joint)
             model = spec.compile()
+            base = [int(model.joint(one).id) for one in names]
         elif free_base:
             raise PvidError(f"{path}: has no free joint, which MJCF has for a free base")
     except ValueError as error:
         raise PvidError(f"{path}: MuJoCo does not read it: {printable(reason(error))}") from None
     finally:
         mujoco.set_mju_user_warning(usual)
-    return mujoco, model, speeds, notes, bare
+    return mujoco, model, base, speeds, notes, bare
 
 
 def prepared_urdf(tree: ElementTree.Element) -> tuple[dict[str, float], list[str], list[str]]:
@@ -311,24 +312,25 @@ def _free_joint(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> i
     return carrying[0] if carrying else free[0] if free and not others else None
 
 
-def _split(mujoco: Any, spec: Any, number: int) -> None:
-    """Makes six joints of a free joint, whose body's frame is the inertial one where they are 0."""
+def _split(mujoco: Any, spec: Any, number: int) -> list[str]:
+    """Makes six joints of a free joint, whose body's frame is the inertial one where they are 0; returns their
+    names."""
     joint = next(one for one in spec.joints if one.id == number)
     body, base = joint.parent, printable(joint.parent.name) or "base"
     spec.delete(joint)
     base += "_body" if base in [one.name for one in spec.joints] else ""
     body.pos, body.quat = np.zeros(3), np.eye(4)[0]
-    for k, pose in enumerate(POSE):
-        kind = mujoco.mjtJoint.mjJNT_SLIDE if k < _SLIDES_FREE else mujoco.mjtJoint.mjJNT_HINGE
-        axis = np.eye(3)[k if k < _SLIDES_FREE else len(POSE) - 1 - k]
-        added = body.add_joint(name=base if k == len(POSE) - 1 else f"{base}_{pose}", type=kind, axis=axis)
+    names = [*(f"{base}_{pose}" for pose in POSE[:-1]), base]
+    for k, (name, axis) in enumerate(zip(names, POSE_AXES, strict=True)):
+        kind = mujoco.mjtJoint.mjJNT_SLIDE if k < SLIDING else mujoco.mjtJoint.mjJNT_HINGE
+        added = body.add_joint(name=name, type=kind, axis=axis)
         added.pos = np.zeros(3)  # a class of the file may have another
+    return names
 
 
-def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> tuple[int, list[int]]:
-    """How many joints are of a free base, and the numbers of all, those of a body before those that it carries."""
+def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str], base: Sequence[int]) -> list[int]:
+    """Numbers of the joints without those of a free base, those of a body before those that it carries."""
     names = _names(model)
-    base = _free_joints(names)
     for one in range(model.njnt):
         if model.jnt_type[one] == mujoco.mjtJoint.mjJNT_BALL:
             raise PvidError(f"{path}: {printable(names[one])} is a ball joint: only joints of one axis are identified")
@@ -358,16 +360,7 @@ def _chosen(mujoco: Any, model: Any, path: Path, chosen: Sequence[str]) -> tuple
             raise PvidError(
                 f"{path}: {printable(names[one])} has a spring (stiffness), which no base parameter describes"
             )
-    return len(base), [*base, *joints]
-
-
-def _free_joints(names: Sequence[str]) -> list[int]:
-    """The six that `_split` made."""
-    for k in range(len(names) - len(POSE) + 1):
-        base = names[k + len(POSE) - 1]
-        if list(names[k : k + len(POSE) - 1]) == [f"{base}_{one}" for one in POSE[:-1]]:
-            return list(range(k, k + len(POSE)))
-    return []
+    return joints
 
 
 def _is_under(model: Any, joint: int, other: int) -> bool:

@@ -22,7 +22,18 @@ from pvid.base.version import __version__
 from pvid.base.wording import listed, reason, with_unit
 from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.sensor_prediction import SensorPrediction
-from pvid.identification.summary import REACH, VERDICTS, Made, has_0, head, prefixed, printed_unit, sentences, shown
+from pvid.identification.summary import (
+    REACH,
+    VERDICTS,
+    Made,
+    has_0,
+    head,
+    meaning_of,
+    prefixed,
+    printed_unit,
+    sentences,
+    shown,
+)
 from pvid.identification.validation import Validation
 from pvid.model.readable import readable
 from pvid.oracle.weak.words import Word
@@ -93,7 +104,7 @@ def _values(values: Mapping[str, Value], meanings: Mapping[str, str]) -> str:
     """Each with what it is, and its interval."""
     rows = []
     for name, one in values.items():
-        meaning = meanings.get(name.partition("[")[0])
+        meaning = meaning_of(name, meanings)
         label = text(name) + (f'<br><span class="quiet">{text(meaning)}</span>' if meaning else "")
         told, word = shown(one), f'<span class="{_CLASS[one.word]}">{VERDICTS[one.word][0].lower()}</span>'
         if told is None:

@@ -67,8 +67,7 @@ def refine(answer: Analysis) -> RefinedMechanism:
     anywhere.
     """
     model, weak, recording = answer.model, answer.found, answer.recording
-    if model.drifts:
-        model.refuse_constraints("the refinement")
+    model.refuse_drifts("the refinement")
     sure = all(one.status != "not_identified" for one in weak.judged)
     small = {k for k, one in enumerate(weak.judged) if one.status == "near_zero"}
     first = None

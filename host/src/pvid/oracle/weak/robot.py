@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.model.chain import WRENCH, Chain, friction
+from pvid.model.chain import POSE, SLIDING, WRENCH, Chain, friction
 from pvid.model.compiled import CompiledModel
 from pvid.model.operations import evaluated
 from pvid.oracle.weak.filters import polynomial_weights
@@ -122,9 +122,10 @@ class RobotRun:
             positions, torques = [], []
             for joint in range(len(self.chain.joints)):
                 q = samples[self.chain.position(joint)][part]
-                positions.append(np.unwrap(q) if joint in (3, 5) and joint < self.chain.free else q)
+                turns = SLIDING <= joint < self.chain.free
+                positions.append(np.unwrap(q) if turns and POSE[joint] != "pitch" else q)
             if self.chain.free:
-                upright = float(np.max(np.abs(positions[4])))
+                upright = float(np.max(np.abs(positions[POSE.index("pitch")])))
                 if upright > math.pi / 2:
                     raise PvidError(
                         f"pitch reaches {upright:.3g}, and is at most pi/2 rad: is it in degrees? "
@@ -137,7 +138,7 @@ class RobotRun:
                     )
                 wrench = [samples.get(name, np.zeros(part.stop))[part] for name in WRENCH]
                 held = any(one.name in WRENCH and one.hold == "zoh" for one in model.signals)
-                torques += _generalised(list(map(of_hold, wrench)) if held else wrench, positions[3:6])
+                torques += _generalised(list(map(of_hold, wrench)) if held else wrench, positions[SLIDING : len(POSE)])
             for k in range(1, len(self.chain.joints) - self.chain.free + 1):
                 name = f"tau{k}" if f"tau{k}" in samples else f"i{k}"
                 held = model.signal(name).hold == "zoh"
@@ -151,8 +152,8 @@ class RobotRun:
             raise PvidError("every torque is 0 at all times: a motion without a known force has no parameters")
         if self.torques and (still := [k for k in self.idle if k >= self.chain.free]):
             raise PvidError(
-                f"{self.chain.force(still[0])} is 0 in every sample: is it recorded? A joint that nothing drives can "
-                "be held, and left out of `pvid model from --joints`"
+                f"the {self.chain.force(still[0])} is 0 in every sample: is it recorded? A joint that nothing drives "
+                "can be held, and left out of `pvid model from --joints`"
             )
 
     @cached_property
@@ -580,7 +581,7 @@ def _idle_parts(whole: RobotRun, rows: RobotRows, grams: Float) -> Float:
                if one is None and chain.standard[base.standard].kind not in friction_only]  # fmt: skip
     if unknown:
         raise PvidError(
-            f"where nothing drives {chain.force(whole.idle[0]).removeprefix('the ')} values are needed to begin with, "
+            f"where nothing drives {chain.force(whole.idle[0])} values are needed to begin with, "
             f"for {', '.join(unknown)}: give every joint its inertial"
         )
     again = RobotRows.of(whole, tuple(one.standard for one in chain.base), 0)
