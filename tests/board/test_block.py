@@ -41,7 +41,7 @@ def identifier_of(name: str, kind: str) -> tuple[Any, Samples]:
     return core, np.ascontiguousarray(samples_in_si(board), np.float32)
 
 
-def told(reasons: list[Reason]) -> Reason:
+def reason_of(reasons: list[Reason]) -> Reason:
     """Of a block."""
     new = [one for one in reasons if one in NEW]
     return (new or [one for one in reasons if one not in IDLE] or reasons)[-1]
@@ -77,8 +77,8 @@ def assert_same_in_blocks(core: Any, samples: Samples, *, held: bool = True) -> 
             end = min(tick + next(sizes), *(one for one in (*changes, ticks) if one > tick))
             reason = Reason(block(core.state, pointer(samples[tick:end]), end - tick))
             if end > tick:
-                assert states_of(core) == states[end - 1], f"{lengths}, behind tick {end}"
-                assert reason is told(reasons[tick:end]), f"{lengths}, behind tick {end}"
+                assert states_of(core) == states[end - 1], f"{lengths}, after tick {end}"
+                assert reason is reason_of(reasons[tick:end]), f"{lengths}, after tick {end}"
             tick = end
     return set(reasons)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from motor_run import recording
+from motor_run import motor_equations, recording
 from scipy.optimize import lsq_linear
 
 import pvid
@@ -67,13 +67,8 @@ def test_a_bound_that_no_longer_acts_lets_its_parameter_go() -> None:
 
 def motor() -> CompiledModel:
     model = Model("bounded motor")
-    w = model.sensor("w", "rad/s", noise=0.05, reach=300, gain_sd=0)
-    i = model.sensor("i", "A", noise=0.01, reach=10, gain_sd=0)
-    v = model.input("V", "V", "zoh", reach=24, gain_sd=0)
     given = "R:ohm:1 L:H:1e-3 k:V*s/rad:0.05 J:kg*m^2:1e-4 b:N*m*s/rad:1e-4"
-    own = {n: model.unknown(n, unit, float(guess)) for n, unit, guess in (one.split(":") for one in given.split())}
-    model.equation(own["L"] * i.d() + own["R"] * i + own["k"] * w - v)
-    model.equation(own["J"] * w.d() + own["b"] * w - own["k"] * i)
+    motor_equations(model, "k", "k", given)
     return model.compiled("bounded_motor")
 
 
