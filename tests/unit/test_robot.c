@@ -16,6 +16,7 @@ static const uint16_t end[1] = {P};
 static const uint8_t column[P] = {0, 1, 2, 3};
 static const uint16_t slot[4] = {1, 2, 3, 0};
 static const float gain[1] = {2.0f}; /* N*m per ampere */
+static const float share[P] = {1.0f, 1.0f, 1.0f, 0.5f};
 static const bool held[1] = {false};
 
 /* tau = d/dt (J q') + w sin q + Fv q' + Fc sgn q'. */
@@ -35,6 +36,7 @@ static const pvid_robot_model_f32 model = {.joints = 1,
                                            .column = column,
                                            .slot = slot,
                                            .gain = gain,
+                                           .share = share,
                                            .held = held,
                                            .values = values};
 static float position[HALF];
@@ -42,6 +44,9 @@ static float rate[HALF];
 static float spline[4u * L];
 static float slope[4u * L];
 static float torque[8u * L * MOST_D];
+static float added[2u * PVID_ROBOT_NOISE];
+static float noise_sd[1];
+static float blur; /* of the encoder [rad] */
 static unsigned decimation = MOST_D;
 static const float start[P] = {0.1f, 1.0f, 0.0f, 0.0f};
 static const float start_sd[P] = {10.0f, 10.0f, 10.0f, 10.0f};
@@ -64,6 +69,15 @@ static double b_spline(double u, int degree)
     return sum / ((degree == 2) ? 2.0 : 6.0);
 }
 
+/* White, with sd 1. */
+static double random_at(unsigned k)
+{
+    uint32_t x = (k + 1u) * 2654435761u;
+    x = (x ^ (x >> 15)) * 2246822519u;
+    x = (x ^ (x >> 13)) * 3266489917u;
+    return sqrt(12.0) * (((x ^ (x >> 16)) % 100000u) / 100000.0 - 0.5);
+}
+
 /* Local lines instead of polynomials of degree 4: enough for a slow motion. */
 static pvid_robot_design_f32 design_of(void)
 {
@@ -82,8 +96,18 @@ static pvid_robot_design_f32 design_of(void)
         const double u = (double)(i % half) / ticks + ((i < half) ? 0.0 : 0.5 / ticks);
         torque[i] = (float)(b_spline(u, 3) / (double)decimation);
     }
-    return (pvid_robot_design_f32){TAPS,   (uint8_t)decimation,     L, position, rate, spline, slope,
-                                   torque, {1.0f, 0.0f, 0.0f, 0.0f}};
+    for (unsigned i = 0; i < PVID_ROBOT_NOISE; i++) {
+        double white[5];
+        for (unsigned k = 0; k < 5u; k++) {
+            white[k] = random_at(((i * decimation) + k) % (PVID_ROBOT_NOISE * decimation));
+        }
+        added[i] = (float)white[2];
+        added[PVID_ROBOT_NOISE + i] =
+            (float)((double)rate[0] * (white[3] - white[1]) + (double)rate[1] * (white[4] - white[0]));
+    }
+    noise_sd[0] = blur;
+    return (pvid_robot_design_f32){TAPS,     (uint8_t)decimation,     L, position, rate, spline, slope, torque, added,
+                                   noise_sd, {1.0f, 0.0f, 0.0f, 0.0f}};
 }
 
 static pvid_robot_design_f32 design;
@@ -109,7 +133,7 @@ static void sample_at(unsigned tick, double w, float sample[2])
     const double a = -1.69 * sin(1.3 * t) - 5.046 * sin(2.9 * t + 1.0) - 5.043 * cos(4.1 * t);
     const double noise = ((tick * 2654435761u) % 1000u) / 1000.0 - 0.5;
     const double tau = truth[0] * a + w * sin(q) + truth[2] * v + truth[3] * ((v > 0.0) ? 1.0 : -1.0) + 0.1 * noise;
-    sample[0] = (float)q;
+    sample[0] = (float)(q + (double)blur * random_at(tick + 777777u));
     sample[1] = (float)(tau / 2.0);
 }
 
@@ -144,6 +168,25 @@ static void the_parameters_of_a_joint_are_found_with_their_errors(void **state)
     begin();
     assert_true(play(0, 6000, 2.0) > 10u);
     require_truth(2.0);
+}
+
+static void noise_of_the_encoder_does_not_move_the_parameters(void **state)
+{
+    float of[2][2u * P];
+    blur = 0.001f; /* the noise of the rate is a tenth of the rate */
+    for (unsigned corrected = 0; corrected < 2u; corrected++) {
+        pvid_robot_config_f32 config = config_of();
+        config.memory = 10000;
+        noise_sd[0] = (corrected == 1u) ? blur : 0.0f;
+        assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
+        (void)play(0, 48000, 2.0);
+        assert_true(pvid_robot_read_f32(&robot, of[corrected], NULL));
+    }
+    blur = 0.0f;
+    for (unsigned k = 0; k < 2u; k++) { /* J from -0.020 to -0.004, w from -0.106 to -0.024 */
+        const double off = fabs((double)of[0][k] - truth[k]);
+        assert_true((off > 8.0 * (double)of[0][P + k]) && (fabs((double)of[1][k] - truth[k]) < 0.3 * off));
+    }
 }
 
 static void the_covariance_has_the_standard_errors(void **state)
@@ -402,6 +445,7 @@ static void what_is_out_of_range_is_refused_by_its_status(void **state)
     REFUSE_MODEL(entries, 0);
     REFUSE_MODEL(forces, 5);
     REFUSE_MODEL(end, NULL);
+    static const float high_share[P] = {1.0f, 1.0f, 1.5f, 1.0f};
     REFUSE_MODEL(end, long_end);
     REFUSE_MODEL(column, NULL);
     REFUSE_MODEL(column, twice);
@@ -411,6 +455,8 @@ static void what_is_out_of_range_is_refused_by_its_status(void **state)
     REFUSE_MODEL(gain, NULL);
     REFUSE_MODEL(gain, no_gain);
     REFUSE_MODEL(gain, infinite_gain);
+    REFUSE_MODEL(share, NULL);
+    REFUSE_MODEL(share, high_share);
     REFUSE_MODEL(held, NULL);
     REFUSE_MODEL(values, NULL);
 
@@ -431,6 +477,8 @@ static void what_is_out_of_range_is_refused_by_its_status(void **state)
     REFUSE_DESIGN(spline, NULL);
     REFUSE_DESIGN(slope, NULL);
     REFUSE_DESIGN(torque, NULL);
+    REFUSE_DESIGN(noise, NULL);
+    REFUSE_DESIGN(noise_sd, NULL);
     REFUSE_DESIGN(white[0], 0.0f);
     REFUSE_DESIGN(white[0], NAN);
     REFUSE_DESIGN(white[1], 2.0f);  /* a zero at 2 */
@@ -455,7 +503,7 @@ static void what_is_out_of_range_is_refused_by_its_status(void **state)
     config.group = 3;
     refuse(&config, PVID_BAD_WINDOW);
     config = config_of();
-    config.group = 4; /* 14 stages need 5 intervals: of 5 ticks one is for the row and one is spare */
+    config.group = 4; /* 14 stages and a beginning need 5 intervals: of 5 ticks one is for the row, one ends it */
     refuse(&config, PVID_BAD_WINDOW);
     config.group = 5;
     assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
@@ -500,6 +548,7 @@ static void before_init_nothing_is_done(void **state)
 
 static const struct CMUnitTest tests[] = {
     cmocka_unit_test(the_parameters_of_a_joint_are_found_with_their_errors),
+    cmocka_unit_test(noise_of_the_encoder_does_not_move_the_parameters),
     cmocka_unit_test(the_covariance_has_the_standard_errors),
     cmocka_unit_test(a_changed_joint_is_followed_with_a_short_memory),
     cmocka_unit_test(what_is_not_finite_restarts_the_splines_and_keeps_the_sums),

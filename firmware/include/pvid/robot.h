@@ -13,6 +13,11 @@
  * Cholesky, a row of the factor each tick. Then F_i -= S_i dp and Q_i follow p: rounding of S_i acts on dp alone. Where
  * Q_i falls below 2^-10 of itself the joint's sums begin again at the new p. No window of samples is kept.
  *
+ * Noise of the encoders is in the columns, too: a part d of a row moves F by -d (d p) in the mean. As much noise is
+ * therefore added again, from a table of one period. What that changes in a row is such a d, and G_i = sum d (d p), as
+ * if of all rows, is added to F_i in the equation. G_i begins with the first estimate, forgets within 16 of them, and
+ * begins again where Q_i falls by a tenth.
+ *
  *   static pvid_robot_f32 identifier;
  *   static float memory[ARM_MEMORY];
  *   if (pvid_robot_init_f32(&identifier, &arm_config_f32, memory, ARM_MEMORY) != PVID_OK) ...
@@ -26,8 +31,7 @@
  * before the one that shows it. What is not caught stays until `memory` rows have passed several times, or init.
  *
  * Never allocates: all that depends on the model is in `memory`, and no PVID_MAX_ size matters. Every input is allowed.
- * Call all functions from one context, except pvid_robot_read_f32. Noise of the encoders in the columns is not
- * corrected: it biases by less than a standard error where the encoders have 16 bits and more.
+ * Call all functions from one context, except pvid_robot_read_f32.
  */
 #ifndef PVID_ROBOT_H
 #define PVID_ROBOT_H
@@ -46,6 +50,7 @@ extern "C" {
 #define PVID_ROBOT_JOINTS 12u /* most joints of a robot */
 #define PVID_ROBOT_P 64u      /* most base parameters */
 #define PVID_ROBOT_SPLINES 4u /* that overlap */
+#define PVID_ROBOT_NOISE 128u /* steps of the period of the added noise */
 
 /* Of a robot: generated. A slot is a column of a joint; the slots of a joint follow each other. */
 typedef struct {
@@ -57,7 +62,9 @@ typedef struct {
     const uint8_t *column; /* [slots] the parameter of each, ascending within a joint */
     const uint16_t *slot;  /* [entries] to which each result is added */
     const float *gain;     /* [n] of each recorded torque: 1, or a torque constant; 1e-9..1e9, either sign */
-    const bool *held;      /* [n] the torque is held from its sample to the next */
+    const float
+        *share;       /* [p] of what added noise changes: 1; 1/2 of dry friction, as its sign changes by both noises */
+    const bool *held; /* [n] the torque is held from its sample to the next */
     /* From q [rad, m], v [rad/s, m/s] and the mean of sgn(v) over a step, in[3][n]: out[entries]. */
     void (*values)(const float in[], float out[]);
 } pvid_robot_model_f32;
@@ -72,6 +79,9 @@ typedef struct {
     const float *spline;             /* [4][L] B at the steps, by intervals since its start */
     const float *slope;              /* [4][L] -B' [1/s] */
     const float *torque;             /* [2][4][L D] B / D at the ticks; then half a tick later, of what is held */
+    const float *noise;              /* [2][PVID_ROBOT_NOISE] white noise of samples with sd 1, at the steps: as the
+                                        polynomials pass it to q and to v [1/s] */
+    const float *noise_sd;           /* [n] of each encoder's samples [rad, m]; 0: nothing is corrected */
     float white[PVID_ROBOT_SPLINES]; /* w, w_0 in 1e-9..1e9, of a recursion that is stable */
 } pvid_robot_design_f32;
 
@@ -81,19 +91,20 @@ typedef struct {
     const float *start;                  /* [p] first estimate, as of the robot's file, within 1e9 */
     const float *start_sd;               /* [p] its standard deviation, 1e-9..1e9 */
     uint16_t group; /* accepted rows of a joint, in the mean of the joints, between two estimates: 1..65535, of which an
-                       estimate, 3 n + 2 p + 3 free ticks, needs some */
+                       estimate, 3 n + 2 p + 4 free ticks, needs some */
     uint32_t memory; /* rows of a joint, 8 p..2^20: as many count in full, older ones half each time */
 } pvid_robot_config_f32;
 
 /* Places in `memory`. */
 typedef struct {
     uint32_t ring;   /* [2 n][2][taps] samples, each twice */
-    uint32_t values; /* [entries] of a step */
-    uint32_t inputs; /* [3][n] likewise */
-    uint32_t sums;   /* [slots + n][4] columns, then torques, of each spline */
-    uint32_t white;  /* [3][slots + n] the last white rows */
+    uint32_t values; /* [2][entries] of a step, then with added noise */
+    uint32_t inputs; /* [2][3][n] likewise */
+    uint32_t sums;   /* [2 slots + n][4] columns, torques, then changes by the noise, of each spline */
+    uint32_t white;  /* [3][2 slots + n] the last white rows */
     uint32_t s;      /* lower triangle of each joint */
     uint32_t f;      /* [slots] */
+    uint32_t g;      /* [slots] */
     uint32_t m;      /* lower triangle [p]; then its factor L */
     uint32_t z;      /* [p] */
     uint32_t delta;  /* [p] dp */
@@ -113,6 +124,7 @@ typedef struct {
     pvid_publication_mark mark;
     float q[PVID_ROBOT_JOINTS];        /* Q_i */
     uint32_t rows[PVID_ROBOT_JOINTS];  /* accepted, in S_i */
+    float noisy[PVID_ROBOT_JOINTS];    /* rows in G_i */
     uint32_t doubt[PVID_ROBOT_JOINTS]; /* 16 for each outlier, less 1 for each accepted row */
     uint32_t rejected;                 /* samples that were not finite, or beyond their range */
     uint32_t saturated;                /* rows beyond 1e9 */
@@ -128,6 +140,7 @@ typedef struct {
     uint8_t young;   /* intervals until a spline has been added from its start on */
     uint8_t latest;  /* place of the latest white rows, of 3 */
     uint8_t row;     /* joint whose row is next; all: none */
+    uint8_t noise;   /* place of the step in the added noise */
     uint8_t stage;
     uint8_t index;     /* within the stage */
     uint8_t corrected; /* joints whose F and Q are of `next` already */

@@ -22,6 +22,9 @@
 #define DOUBT 16u             /* accepted rows that outweigh an outlier */
 #define OPEN 64u              /* doubt from which the gate lets all pass */
 #define FALL 9.765625e-4f     /* of Q_i, beyond which it is rounding */
+#define AGAIN 0.9f            /* of Q_i, beyond which G_i was of another p */
+#define AGING 0.9375f         /* of G_i, an estimate */
+#define FIRST_ROWS 2.0f       /* of G_i: as if as many had no noise */
 #define KNOWN 0.5f            /* standard error of a known parameter, of that of the start */
 #define MOST_TAPS 1024u
 #define MOST_ROWS 1048576u
@@ -38,6 +41,12 @@ static inline uint32_t triangle(uint32_t n)
 static inline uint16_t first_of(const pvid_robot_model_f32 *model, uint8_t joint)
 {
     return (joint == 0u) ? 0u : model->end[joint - 1u];
+}
+
+/* Floats of a white row of all joints: columns, torques, changes of the columns by the added noise. */
+static inline uint32_t width_of(const pvid_robot_f32 *self)
+{
+    return (2u * (uint32_t)self->slots) + self->config.model->joints;
 }
 
 /* Entries of S of the joints before this one. */
@@ -58,12 +67,13 @@ static uint32_t places(const pvid_robot_model_f32 *model, const pvid_robot_desig
     self->slots = (uint16_t)slots;
     self->at.ring = 0;
     self->at.values = 4u * n * design->taps;
-    self->at.inputs = self->at.values + model->entries;
-    self->at.sums = self->at.inputs + (3u * n);
-    self->at.white = self->at.sums + (SPLINES * (slots + n));
-    self->at.s = self->at.white + (PAST * (slots + n));
+    self->at.inputs = self->at.values + (2u * (uint32_t)model->entries);
+    self->at.sums = self->at.inputs + (6u * n);
+    self->at.white = self->at.sums + (SPLINES * ((2u * slots) + n));
+    self->at.s = self->at.white + (PAST * ((2u * slots) + n));
     self->at.f = self->at.s + before(model, model->joints);
-    self->at.m = self->at.f + slots;
+    self->at.g = self->at.f + slots;
+    self->at.m = self->at.g + slots;
     self->at.z = self->at.m + triangle(p);
     self->at.delta = self->at.z + p;
     self->at.p = self->at.delta + p;
@@ -91,7 +101,7 @@ static bool model_is_valid(const pvid_robot_model_f32 *model)
         (model->slot == NULL) || (model->held == NULL) || (model->values == NULL) || (model->gain == NULL)) {
         return false;
     }
-    bool valid = true;
+    bool valid = are_within(model->share, model->p, 1.0f);
     for (uint8_t j = 0; j < model->joints; j++) {
         valid = valid && pvid_within_f32(pvid_magnitude_f32(model->gain[j]), 1.0e-9f, ROW_LIMIT);
         const uint16_t first = first_of(model, j);
@@ -116,7 +126,7 @@ static bool white_is_stable(const float w[])
            (((1.0f + a) - b) > -c) && (pvid_magnitude_f32(b + (a * c)) < (1.0f - (c * c)));
 }
 
-static bool design_is_valid(const pvid_robot_design_f32 *design)
+static bool design_is_valid(const pvid_robot_design_f32 *design, uint32_t joints)
 {
     const uint32_t ticks = (uint32_t)design->interval * design->decimation;
     return (design->taps >= 3u) && ((design->taps % 2u) == 1u) && (design->taps <= MOST_TAPS) &&
@@ -125,21 +135,24 @@ static bool design_is_valid(const pvid_robot_design_f32 *design)
            are_within(design->rate, design->taps / 2u, ROW_LIMIT) &&
            are_within(design->spline, SPLINES * design->interval, ROW_LIMIT) &&
            are_within(design->slope, SPLINES * design->interval, ROW_LIMIT) &&
-           are_within(design->torque, 2u * SPLINES * ticks, ROW_LIMIT) && white_is_stable(design->white);
+           are_within(design->torque, 2u * SPLINES * ticks, ROW_LIMIT) &&
+           are_within(design->noise, 2u * PVID_ROBOT_NOISE, ROW_LIMIT) &&
+           are_within(design->noise_sd, joints, ROW_LIMIT) && white_is_stable(design->white);
 }
 
 PVID_COLD uint32_t pvid_robot_memory_f32(const pvid_robot_model_f32 *model, const pvid_robot_design_f32 *design)
 {
     pvid_robot_f32 none;
-    const bool valid = (model != NULL) && (design != NULL) && model_is_valid(model) && design_is_valid(design);
+    const bool valid =
+        (model != NULL) && (design != NULL) && model_is_valid(model) && design_is_valid(design, model->joints);
     return valid ? places(model, design, &none) : 0u;
 }
 
 /* Ticks of an interval that add the row of a joint or do a stage of an estimate: none of those that compute values or
- * add them, where a step has others. */
+ * add them, where a step has others, and not the last one, which makes rows white. */
 static uint32_t free_ticks(const pvid_robot_design_f32 *design)
 {
-    return (uint32_t)design->interval * ((design->decimation > 2u) ? (design->decimation - 2u) : 1u);
+    return ((uint32_t)design->interval * ((design->decimation > 2u) ? (design->decimation - 2u) : 1u)) - 1u;
 }
 
 static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *config, float memory[], uint32_t room)
@@ -152,12 +165,12 @@ static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *co
     if (!model_is_valid(model)) {
         return PVID_BAD_MODEL;
     }
-    if (!design_is_valid(design)) {
+    if (!design_is_valid(design, model->joints)) {
         return PVID_BAD_DESIGN;
     }
     const uint32_t left = free_ticks(design);
     const uint32_t stages = (3u * (uint32_t)model->joints) + (2u * (uint32_t)model->p) + 3u;
-    if ((left <= (model->joints + 1u)) || ((config->group * (left - model->joints - 1u)) < stages)) {
+    if ((left <= model->joints) || ((config->group * (left - model->joints)) <= stages)) { /* and one to begin with */
         return PVID_BAD_WINDOW;
     }
     if (!are_within(config->start, model->p, ROW_LIMIT)) {
@@ -204,8 +217,7 @@ PVID_COLD void pvid_robot_gap_f32(pvid_robot_f32 *self)
     if ((self == NULL) || (self->memory == NULL)) {
         return;
     }
-    const uint32_t width = (uint32_t)self->slots + self->config.model->joints;
-    memset(&self->memory[self->at.sums], 0, (SPLINES + PAST) * (size_t)width * sizeof self->memory[0]);
+    memset(&self->memory[self->at.sums], 0, (SPLINES + PAST) * (size_t)width_of(self) * sizeof self->memory[0]);
     self->filled = 0;
     self->place = 0;
     self->tick = 0;
@@ -252,7 +264,17 @@ static void add_torques(pvid_robot_f32 *self)
     }
 }
 
-/* q, v and the mean of sgn(v) over a step, and from them the values. */
+/* q, v and the mean of sgn(v) over a step, of a joint, into in[3][n], which still has those of the step before. */
+static void set_input(const pvid_robot_f32 *self, float in[], uint32_t joint, float q, float v)
+{
+    const uint32_t n = self->config.model->joints;
+    const float jump = self->begun ? (0.5f * pvid_magnitude_f32(v - in[n + joint])) : 0.0f;
+    in[joint] = q;
+    in[n + joint] = v;
+    in[(2u * n) + joint] = (pvid_magnitude_f32(v) >= jump) ? pvid_sign_f32(v) : (v / jump);
+}
+
+/* The inputs of a step, without and with added noise, and from the first ones the values. */
 static void take_step(pvid_robot_f32 *self)
 {
     const pvid_robot_design_f32 *design = self->config.design;
@@ -260,6 +282,7 @@ static void take_step(pvid_robot_f32 *self)
     const uint32_t half = design->taps / 2u;
     float *in = &self->memory[self->at.inputs];
     for (uint32_t j = 0; j < n; j++) {
+        const uint32_t place = (self->noise + (j * (PVID_ROBOT_NOISE / n))) % PVID_ROBOT_NOISE;
         const float *x = window_of(self, j);
         const float centre = x[half];
         float q = 0.0f; /* relative to it: float32 keeps its resolution */
@@ -271,18 +294,20 @@ static void take_step(pvid_robot_f32 *self)
             q += design->position[i - 1u] * (later + earlier);
             v += design->rate[i - 1u] * (later - earlier);
         }
-        const float jump = self->begun ? (0.5f * pvid_magnitude_f32(v - in[n + j])) : 0.0f;
-        in[j] = centre + q;
-        in[n + j] = v;
-        in[(2u * n) + j] = (pvid_magnitude_f32(v) >= jump) ? pvid_sign_f32(v) : (v / jump);
+        q += centre;
+        set_input(self, in, j, q, v);
+        q += design->noise_sd[j] * design->noise[place];
+        v += design->noise_sd[j] * design->noise[PVID_ROBOT_NOISE + place];
+        set_input(self, &in[3u * n], j, q, v);
     }
+    self->noise = (uint8_t)((self->noise + 1u) % PVID_ROBOT_NOISE);
     self->begun = true;
     self->config.model->values(in, &self->memory[self->at.values]);
 }
 
-/* sums[slot][4] += weight[4] value, of each value. */
-static void add_to_slots(float sums[], const uint16_t slot[], const float value[], uint32_t values,
-                         const float weight[])
+/* sums[slot][4] += weight[4] value, and changes[slot][4] likewise of noisy - value, of each value. */
+static void add_to_slots(float sums[], float changes[], const uint16_t slot[], const float value[], const float noisy[],
+                         uint32_t values, const float weight[])
 {
     const float w0 = weight[0];
     const float w1 = weight[1];
@@ -290,35 +315,44 @@ static void add_to_slots(float sums[], const uint16_t slot[], const float value[
     const float w3 = weight[3];
     for (uint32_t i = 0; i < values; i++) {
         float *sum = &sums[SPLINES * (uint32_t)slot[i]];
+        float *change = &changes[SPLINES * (uint32_t)slot[i]];
         const float x = value[i];
+        const float d = noisy[i] - x;
         sum[0] += w0 * x;
         sum[1] += w1 * x;
         sum[2] += w2 * x;
         sum[3] += w3 * x;
+        change[0] += w0 * d;
+        change[1] += w1 * d;
+        change[2] += w2 * d;
+        change[3] += w3 * d;
     }
 }
 
-/* Adds the values of a step to the four splines. */
+/* Adds the values of a step, and what the noise changes in them, to the four splines. */
 static void add_values(pvid_robot_f32 *self)
 {
     const pvid_robot_model_f32 *model = self->config.model;
     const pvid_robot_design_f32 *design = self->config.design;
     const uint32_t step = self->tick / design->decimation;
+    const uint32_t first = model->forces;
     const float *values = &self->memory[self->at.values];
+    float *noisy = &self->memory[self->at.values + model->entries];
     float *sums = &self->memory[self->at.sums];
+    float *changes = &sums[SPLINES * ((uint32_t)self->slots + model->joints)];
     float weight[SPLINES] = {0.0f, 0.0f, 0.0f, 0.0f};
+    model->values(&self->memory[self->at.inputs + (3u * (uint32_t)model->joints)], noisy);
     weights_of(self->spline, &design->spline[step], design->interval, weight);
-    add_to_slots(sums, model->slot, values, model->forces, weight);
+    add_to_slots(sums, changes, model->slot, values, noisy, first, weight);
     weights_of(self->spline, &design->slope[step], design->interval, weight);
-    add_to_slots(sums, &model->slot[model->forces], &values[model->forces], (uint32_t)model->entries - model->forces,
-                 weight);
+    add_to_slots(sums, changes, &model->slot[first], &values[first], &noisy[first], model->entries - first, weight);
 }
 
 /* The oldest spline is complete: its rows become white, and its sums those of the next one. */
 static void end_interval(pvid_robot_f32 *self)
 {
     const float *w = self->config.design->white;
-    const uint32_t width = (uint32_t)self->slots + self->config.model->joints;
+    const uint32_t width = width_of(self);
     const uint8_t oldest = (uint8_t)((self->spline + 1u) % SPLINES);
     float *sums = &self->memory[self->at.sums + oldest];
     self->spline = oldest;
@@ -363,17 +397,21 @@ static pvid_reason add_row(pvid_robot_f32 *self)
     const uint8_t joint = self->row;
     const uint16_t first = first_of(model, joint);
     const uint32_t n = (uint32_t)model->end[joint] - first;
-    const float *u = &self->memory[self->at.white + (self->latest * ((uint32_t)self->slots + model->joints)) + first];
+    const float *u = &self->memory[self->at.white + (self->latest * width_of(self)) + first];
+    const float *d = &u[(uint32_t)self->slots + model->joints];
     const float *p = &self->memory[(joint < self->corrected) ? self->at.next : self->at.p];
     float *s = &self->memory[self->at.s + before(model, joint)];
     float *f = &self->memory[self->at.f + first];
+    float *g = &self->memory[self->at.g + first];
     const float y = u[((uint32_t)self->slots + joint) - first];
     self->row++;
     float e = y;
+    float by_noise = 0.0f;
     bool fits = pvid_magnitude_f32(y) <= ROW_LIMIT; /* NaN fails the comparison */
     for (uint32_t i = 0; i < n; i++) {
         e -= u[i] * p[model->column[first + i]];
-        fits = fits && (pvid_magnitude_f32(u[i]) <= ROW_LIMIT);
+        by_noise += d[i] * (model->share[model->column[first + i]] * p[model->column[first + i]]);
+        fits = fits && (pvid_magnitude_f32(u[i]) <= ROW_LIMIT) && (pvid_magnitude_f32(d[i]) <= ROW_LIMIT);
     }
     if (!fits || !(pvid_magnitude_f32(e) <= ROW_LIMIT)) {
         pvid_count_up(&self->saturated);
@@ -398,10 +436,26 @@ static pvid_reason add_row(pvid_robot_f32 *self)
         f[i] += x * e;
     }
     self->q[joint] += e * e;
+    if (self->number > 0u) {
+        for (uint32_t i = 0; i < n; i++) {
+            g[i] += by_noise * d[i];
+        }
+        self->noisy[joint] += 1.0f;
+    }
     return PVID_ACCUMULATED;
 }
 
 /* ---- the estimate, a stage a tick ---- */
+
+/* The rows in G of a joint count less. */
+static void forget_noise(pvid_robot_f32 *self, uint8_t joint, float by)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    for (uint32_t i = first_of(model, joint); i < model->end[joint]; i++) {
+        self->memory[self->at.g + i] *= by;
+    }
+    self->noisy[joint] *= by;
+}
 
 /* All rows of a joint count less. */
 static void forget(pvid_robot_f32 *self, uint8_t joint, float by)
@@ -418,6 +472,7 @@ static void forget(pvid_robot_f32 *self, uint8_t joint, float by)
     self->q[joint] *= by;
     const float rows = by * (float)self->rows[joint];
     self->rows[joint] = (uint32_t)rows;
+    forget_noise(self, joint, by);
 }
 
 /* M and the right side: those of the start, then joint by joint. */
@@ -436,6 +491,7 @@ static void assemble(pvid_robot_f32 *self, uint8_t joint)
         }
     }
     const float weight = free_rows(self, joint) / ((self->q[joint] > LEAST_Q) ? self->q[joint] : LEAST_Q);
+    const float of_noise = (float)self->rows[joint] / (self->noisy[joint] + FIRST_ROWS);
     const uint16_t first = first_of(model, joint);
     const float *s = &memory[self->at.s + before(model, joint)];
     for (uint32_t i = first; i < model->end[joint]; i++) {
@@ -445,7 +501,8 @@ static void assemble(pvid_robot_f32 *self, uint8_t joint)
             row[model->column[j]] += weight * s[j - first];
         }
         s = &s[(i - first) + 1u];
-        memory[self->at.z + model->column[i]] += weight * memory[self->at.f + i];
+        memory[self->at.z + model->column[i]] +=
+            weight * (memory[self->at.f + i] + (of_noise * memory[self->at.g + i]));
     }
 }
 
@@ -530,10 +587,12 @@ static void correct(pvid_robot_f32 *self, uint8_t joint)
         change -= d[i] * f[i];
     }
     const float q = self->q[joint] + change;
-    const bool cancelled = q < (FALL * self->q[joint]);
+    const float before_it = self->q[joint];
     self->q[joint] = q;
-    if (cancelled) {
+    if (q < (FALL * before_it)) {
         forget(self, joint, 0.0f);
+    } else {
+        forget_noise(self, joint, (q < (AGAIN * before_it)) ? 0.0f : AGING);
     }
     self->corrected = (uint8_t)(joint + 1u);
 }
@@ -680,12 +739,13 @@ pvid_reason pvid_robot_step_f32(pvid_robot_f32 *self, const float sample[])
     if (within == ((last > 0u) ? 1u : 0u)) {
         add_values(self);
     }
-    const bool is_free = (last > 1u) ? (within > 1u) : (within == last);
+    const bool is_end = (self->tick + 1u) == ((uint32_t)design->interval * design->decimation);
+    const bool is_free = !is_end && ((last > 1u) ? (within > 1u) : (within == last));
     const pvid_reason reason = is_free ? do_task(self) : PVID_ACCUMULATED;
     self->tick++;
     if ((reason == PVID_REJECTED_OUTLIER) || (reason == PVID_REJECTED_SATURATED)) {
         pvid_robot_gap_f32(self);
-    } else if (self->tick == ((uint32_t)design->interval * design->decimation)) {
+    } else if (is_end) {
         self->tick = 0;
         end_interval(self);
     } else {

@@ -51,8 +51,8 @@ def board_report(model: CompiledModel) -> str:
     rows = sum(len(one) * (len(one) + 1) // 2 for one in files.columns)
     return (
         f"On a board: {files.memory(_LONGEST) * 4 / 1000:.3g} kB of memory at most; a step, one of several samples, is "
-        f"{files.program.cost} and {4 * len(files.slots)} multiplications; a row of all joints {rows}. `pvid model "
-        "build --run` writes the C for pvid/robot.h."
+        f"twice {files.program.cost} and {8 * len(files.slots)} multiplications; a row of all joints {rows}. `pvid "
+        "model build --run` writes the C for pvid/robot.h."
     )
 
 
@@ -134,8 +134,8 @@ class RobotFiles:
         """Floats, as pvid_robot_memory_f32."""
         n, p, slots = len(self.chain.joints), len(self.compiled.unknowns), sum(map(len, self.columns))
         triangles = sum(len(one) * (len(one) + 1) // 2 for one in self.columns)
-        fixed = 4 * n * taps + len(self.slots) + 3 * n + 7 * (slots + n)
-        return fixed + triangles + slots + p * (p + 1) // 2 + 10 * p
+        fixed = 4 * n * taps + 2 * len(self.slots) + 6 * n + 7 * (2 * slots + n)
+        return fixed + triangles + 2 * slots + p * (p + 1) // 2 + 10 * p
 
     def banner(self) -> list[str]:
         """Two lines for the head of a file."""
@@ -200,7 +200,8 @@ class RobotFiles:
             "forces": self.forces,
             "entries": len(self.slots),
         }
-        fields |= {one: one for one in ("end", "column", "slot", "gain", "held", "values")}
+        fields |= {one: one for one in ("end", "column", "slot", "gain", "share", "held", "values")}
+        shares = [number(0.5 if self.chain.standard[one.standard].kind == "Fc" else 1.0) for one in self.chain.base]
         parts = [
             c_comment(self.banner()),
             UNCONTRACTED,
@@ -210,6 +211,7 @@ class RobotFiles:
             array("uint8_t", "column", [one for own in self.columns for one in own], _WIDTH),
             array("uint16_t", "slot", self.slots, _WIDTH),
             array("float", "gain", gains, _WIDTH),
+            array("float", "share", shares, _WIDTH),
             array("bool", "held", held, _WIDTH),
             initialised(f"const pvid_robot_model_f32 {self.name}_robot_f32", fields),
         ]
@@ -224,7 +226,7 @@ class RobotFiles:
             f"A step of {d.decimation} samples, a row of each joint every {1e3 * d.knots_s:.3g} ms, an estimate every "
             f"{d.group * d.knots_s:.3g} s.",
         ]  # fmt: skip
-        tables = ("position", "rate", "spline", "slope", "torque")
+        tables = ("position", "rate", "spline", "slope", "torque", "noise", "noise_sd")
         white = ", ".join(map(number, d.white))
         body = [
             f'#include "{name}_robot.h"', "",

@@ -19,6 +19,7 @@ Float = npt.NDArray[np.float64]
 _SPLINES = 4  # that overlap: of degree 3
 _STEPS = 5  # of an interval: their rate is 10 times the highest frequency of the test functions
 _GROUP_S = 1.0  # between estimates
+_NOISE = 128  # PVID_ROBOT_NOISE
 _WIDE = 10.0  # of the largest parameter of a unit: standard deviation of the start
 
 
@@ -35,9 +36,9 @@ def robot_core_design(model: CompiledModel, recording: Recording) -> RobotCoreDe
     # As free_ticks of robot_f32.c: an interval has a tick for the row of each joint, and more for the estimate.
     free = max(decimation - 2, 1)
     interval = max(ticks // decimation, -(-(n + 3) // free))
-    stages = 3 * n + 2 * len(model.unknowns) + 3
+    stages = 3 * n + 2 * len(model.unknowns) + 4
     group = max(
-        math.ceil(stages / (interval * free - n - 1)), math.ceil(_GROUP_S * found.sample_rate / (interval * decimation))
+        math.ceil(stages / (interval * free - 1 - n)), math.ceil(_GROUP_S * found.sample_rate / (interval * decimation))
     )
     if interval > 255 or decimation > 255:
         raise PvidError(f"{found.sample_rate:g} samples a second are too many for so slow a motion: record fewer")
@@ -52,7 +53,7 @@ def robot_core_design(model: CompiledModel, recording: Recording) -> RobotCoreDe
         rate, decimation, interval,
         polynomial_weights(found.taps, POLYNOMIAL, 0)[half:],
         polynomial_weights(found.taps, POLYNOMIAL, 1)[half:] * rate,
-        b, -slope * rate / samples, torque, _whitening(b, steps),
+        b, -slope * rate / samples, torque, _noise(found.taps, rate, decimation), found.sd, _whitening(b, steps),
         guesses, _WIDE * np.array(widest), group,
     )  # fmt: skip
 
@@ -63,6 +64,19 @@ def _spline(u: Float) -> tuple[Float, Float]:
     factors = [(-1.0) ** j * math.comb(_SPLINES, j) for j in range(_SPLINES + 1)]
     b, slope = (sum(f * one for f, one in zip(factors, powers[k], strict=True)) / math.factorial(k) for k in (3, 2))
     return np.asarray(b), np.asarray(slope)
+
+
+def _noise(taps: int, rate: float, decimation: int) -> Float:
+    """One period of white noise with sd 1, whose spectrum is flat, behind the polynomials of q and v, at the steps."""
+    size = _NOISE * decimation
+    phases = np.random.default_rng(0).uniform(0, 2 * math.pi, size // 2 + 1)
+    phases[[0, -1]] = 0.0
+    white = math.sqrt(size) * np.exp(1j * phases)
+    gains = [np.zeros(size), np.zeros(size)]
+    for order, gain in enumerate(gains):
+        np.add.at(gain, np.arange(-(taps // 2), taps // 2 + 1) % size, polynomial_weights(taps, POLYNOMIAL, order))
+    passed = [np.fft.irfft(white * np.conj(np.fft.rfft(gain)), size)[::decimation] for gain in gains]
+    return np.concatenate([passed[0], passed[1] * rate])
 
 
 def _whitening(b: Float, steps: int) -> Float:

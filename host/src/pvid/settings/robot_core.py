@@ -22,6 +22,8 @@ class RobotCoreDesign:
     spline: Float
     slope: Float
     torque: Float
+    noise: Float
+    noise_sd: Float
     white: Float
     start: Float
     start_sd: Float
