@@ -227,6 +227,23 @@ def test_what_is_no_table_is_one_sentence(tmp_path: Path) -> None:
         pvid("look", tmp_path / "run.pvlog")
 
 
+@pytest.mark.parametrize(
+    ("names", "typed"),
+    [
+        ("x y z yaw pitch roll fz", "model from robot.urdf --free-base -o robot.py"),
+        ("q1 i1", "model from robot.urdf -o robot.py"),
+        ("x y z yaw q1", ""),
+    ],
+)
+def test_a_log_of_a_robot_is_known_by_its_columns(names: str, typed: str, tmp_path: Path) -> None:
+    t, path = np.arange(400) * 0.002, tmp_path / "log.csv"
+    moves = [np.sin((k + 3) * t) for k in range(len(names.split()))]
+    np.savetxt(path, np.array([t, *moves]).T, delimiter=",", header=",".join(["t", *names.split()]), comments="")
+    told = pvid("look", path).stdout
+    assert ("By names it is a robot" in told) == bool(typed) and typed in told
+    assert ("ring-down" in told) != bool(typed)
+
+
 def test_stamps_since_1970_in_a_compressed_file_are_in_their_unit(tmp_path: Path) -> None:
     stamps = [str(1_700_000_000_123_456_789 + 2_000_000 * k) for k in range(N)]
     plain = written(tmp_path / "topic.csv", "%time,field.x", [stamps, numbers(SLOW)])

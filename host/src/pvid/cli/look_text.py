@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import printable, typed_name, with_unit
 from pvid.cli.input import print_notes
 from pvid.identification.survey import ColumnFacts, Proposal, Survey, lines_of_a_model, proposals, surveyed
+from pvid.model.chain import POSE
 from pvid.models.mechanisms import unused_input
 
 _DIGITS = 4
@@ -69,6 +71,14 @@ def _advice(survey: Survey) -> list[str]:
     file = str(survey.path)
     if not found and not any(one.low < one.high for one in survey.facts):
         return ["Nothing moves in this recording: no mechanism can be found from it, nor identified."]
+    names = set(survey.names)
+    free = names >= set(POSE)
+    if free or names >= {"q1", "tau1"} or names >= {"q1", "i1"}:
+        return [
+            "By names it is a robot, whose model comes from its URDF or MJCF file (host/docs/robots.md):",
+            f"    {typed_name()} model from robot.urdf{' --free-base' if free else ''} -o robot.py",
+            f"    {typed_name()} identify {shlex.quote(file)} --model robot.py",
+        ]
     if not found:
         return [
             f"No mechanism of the list (`{typed_name()} models`) has these columns. Yours is a model file of ten lines "
