@@ -39,6 +39,8 @@ def assert_same(found: Table, left_out: tuple[int, ...] = (), rtol: float = 0.0)
 
 
 HEAD = "t,F,x"
+OWN = [*enumerate(CELLS)]
+BARE = [f"{f},{x}" for _, f, x in CELLS]
 NAMES = "t=time,F=force,x=place"
 IN_MM = [f"{t},{f},{float(x) * 1000:.2f}" for t, f, x in CELLS]
 EARLY = [
@@ -177,6 +179,74 @@ AROUND: dict[str, tuple[str | bytes, str | None, str]] = {
     ),
     "names with commas": (of('t,"Force, N","Place, m: left"', *PLAIN), 'F="Force, N",x="Place, m: left":m', ""),
     "names with quotes": (of('t,F,"5"" rail"', *PLAIN), 'x="5"" rail"', ""),
+    "rows begin with a separator": (of(HEAD, *(f",{line}" for line in PLAIN)), None, ""),
+    "names are numbers": (of("x-axis,1,2", "second,Newton,meter", *PLAIN), "t=x-axis,F=2,x=3", "states units"),
+    "numbers of samples, settings beside the names": (
+        of("X,CH1,CH2,Start,Increment,", "Sequence,Volt,Volt,-1,2e-03,", *(f"{k},{f},{x}," for k, (_, f, x) in OWN)),
+        "t=X,F=CH1,x=CH2",
+        "X counts rows: one each 0.002 s, as line 2 states",
+    ),
+    "no times, settings beside the names": (
+        of("CH1,CH2,t0 = -1.5e+00s, tInc = 2.0e-03,", *(f"{f},{x},," for _, f, x in CELLS)),
+        "F=CH1,x=CH2",
+        "no column of time: a row each 0.002 s, as line 1 states",
+    ),
+    **{
+        f"no times, {line}": (
+            of(line, "F,x", *BARE[:50], "", "# halt", *BARE[50:]),
+            None,
+            "a row each 0.002 s",
+        )
+        for line in (
+            "# dt = 0.002 s",
+            "Sampling interval [ms]: 2",
+            "sample_rate: 0.5 kHz",
+            "# fs=500",
+            "Sampling Rate;500;Hz",
+            "Sample Interval,2.0e-03",
+            "Abtastrate 500 Hz",
+        )
+    },
+    "no times, damaged": (
+        of("# Ts: 2 ms", "F;x", *BARE[:9], "?", *BARE[10:]).replace(",", ";"),
+        None,
+        "a damaged line",
+    ),
+    "no times, LabVIEW": (
+        of(
+            "X_Columns\tNo",
+            "Delta_X\t0,002\t0,002",
+            "***End_of_Header***",
+            "F\tx\tComment",
+            *(f"{f}\t{x}".replace(".", ",") for _, f, x in CELLS),
+        ),
+        None,
+        "a row each 0.002 s, as line 2 states",
+    ),
+    "units in the cells": (of(HEAD, *(f"{t} s,{f}N,{float(x) * 1e3:.2f} mm" for t, f, x in CELLS)), None, "x in mm"),
+    "tuples": (of("start", *(f"({line})".replace(",", ", ") for line in PLAIN)), "t=1,F=2,x=3", "brackets"),
+    "lists": (of(*(f"[{' '.join(cells)}]" for cells in CELLS)), "t=1,F=2,x=3", "brackets"),
+    "objects": (of(*(f'{{"t": {t}, "ok": true, "rig": {{"F": {f}, "x": {x}}}}}' for t, f, x in CELLS)), None, "words"),
+    "messages": (
+        of("boot", *(f"I (123) rig: t={t} s, force = {f} N; x -> x={x}" for t, f, x in CELLS), "end"),
+        "F=force",
+        "behind the table",
+    ),
+    "messages with times": (
+        of(*(f"2024-05-02T10:00:0{t} [INFO] drive: F={f} x={float(x) * 1e3:.2f}mm" for t, f, x in CELLS)),
+        None,
+        "x in mm",
+    ),
+    "records of ROS 2": (
+        of(
+            *(
+                f"stamp:\n  sec: 17\n  nanosec: {round(float(t) * 1e9)}\nforce: {f}\nposition:\n- {x}\n---"
+                for t, f, x in CELLS
+            )
+        ),
+        "F=force,x=position",
+        "words",
+    ),
     "damaged": (
         of(
             HEAD,
@@ -198,7 +268,7 @@ AROUND: dict[str, tuple[str | bytes, str | None, str]] = {
 def test_table_is_found_whatever_stands_around_it(case: str, tmp_path: Path) -> None:
     content, columns, note = AROUND[case]
     found = table(tmp_path, content, columns)
-    assert_same(found, (80, 81) if case == "damaged" else ())
+    assert_same(found, {"damaged": (80, 81), "no times, damaged": (9,)}.get(case, ()))
     assert note in "; ".join(found.notes), found.notes
 
 

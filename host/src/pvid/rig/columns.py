@@ -190,9 +190,11 @@ class Columns:
         name them.
         """
         places = {}
+        numbers = {one.name for one in self.named.values() if one.name.isdecimal()}
+        are_positions = not numbers <= set(names)  # all are names, or none
         for signal in self.units:
             name = self[signal].name
-            times = names.count(name)
+            times = 0 if are_positions and name in numbers else names.count(name)
             if times > 1:
                 at = [str(k + 1) for k, one in enumerate(names) if one == name]
                 raise PvidError(

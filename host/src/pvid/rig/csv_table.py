@@ -14,19 +14,22 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
-from itertools import islice
+from functools import cached_property, partial
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.units import scale_to
 from pvid.base.wording import listed, shown
 from pvid.rig.cells import PLAIN, Evidence, Style, is_missing, is_number, style_note, styles
-from pvid.rig.columns import Columns, unit_in_brackets
+from pvid.rig.columns import TIME, Columns, MissingColumnError, unit_in, unit_in_brackets
 from pvid.rig.layout import Layout, find, split
+from pvid.rig.printed_table import printed
 from pvid.rig.size import refuse_beyond
+from pvid.rig.stated_step import stated_step
 from pvid.rig.table import Table
 from pvid.rig.text_lines import blocks
 from pvid.rig.times import TimesOfDay, is_time
@@ -68,14 +71,21 @@ def read_csv(path: Path, columns: Columns) -> Table:
 def text_table(path: Path, columns: Columns, lines: Callable[[], Iterator[bytes]], line: str = "line") -> Table:
     """Reads a table of what begins to give blocks of lines anew at every call; `line` is what its lines are called."""
     try:
-        table = _TextTable(path, columns, lines, line)
-    except PvidError:
-        other = turned(lines)
-        if other is None:
-            raise
+        return _TextTable(path, columns, lines, line).read()
+    except PvidError as error:
+        refusal = error
+    other = turned(lines)
+    if other is not None:
         found = _TextTable(path, columns, other.blocks, "row").read()
         return replace(found, notes=(f"the table has {other.note}", *found.notes))
-    return table.read()
+    text = printed(lines)
+    if text is None:
+        raise refusal
+    try:
+        found = _TextTable(path, columns, text.blocks, "row").read()
+    except PvidError as error:
+        raise error if text.named and isinstance(error, MissingColumnError) else refusal from None
+    return replace(found, notes=("the numbers stand between words, units or brackets", *found.notes))
 
 
 def write_csv(path: Path, named: dict[str, FloatArray]) -> bytes:
@@ -105,9 +115,24 @@ class _TextTable:
             if 2 * numbers > sum(bool(line.strip()) for line in lines):
                 raise PvidError(f"{path} has one column alone: that of the time, t [s] or another name, is missing.")
             raise PvidError(f"{path} has no line of two numbers or more: this is no table.")
+        step = stated_step(lines[: layout.body - 1], layout)
+        timeless = columns["t"].name == "t" and "t" not in layout.names and not (layout.labelled or layout.beside[0])
+        notes: tuple[str, ...] = ()
+        if timeless and step is not None:
+            self._blocks = partial(_numbered, blocks_of, layout)
+            lines = next(self._blocks()).decode(errors="replace").split("\n", _SEARCHED_LINES)[:_SEARCHED_LINES]
+            layout = replace(layout, names=(*layout.names, "t"), width=layout.width + 1)
+            columns, notes = step.of(columns), (f"no column of time: a row each {step}",)
         self._layout = layout
         where = f", line {layout.header}" if layout.header else ""
-        self._places = columns.places(path, layout.names, where)
+        try:
+            self._places = columns.places(path, layout.names, where)
+        except MissingColumnError as missing:
+            others = (columns[one].name in layout.names for one in columns.units if one != "t")
+            if not timeless or any(map(TIME.is_called, layout.names)) or not all(others):
+                raise
+            hint = "; where rows have no time, a line in front such as '# dt = 0.001 s' states that between them."
+            raise MissingColumnError(str(missing).removesuffix(".") + hint, missing.names) from None
         if max(self._places.values()) >= layout.width:
             raise PvidError(f"{path}{where}: more names than the lines below have cells, {layout.width}.")
         units = {
@@ -120,8 +145,13 @@ class _TextTable:
         self._time_is_text = 2 * times > len(body)
         if self._time_is_text:
             units.pop("t")
-        self._columns, notes = columns.in_units_of_file(units)
-        self._notes = (*_front_note(lines, layout), *notes)
+        is_time_unit = unit_in(columns["t"].name, "s") or scale_to("s", units.get("t", "") or "1")
+        if step is not None and not (notes or columns["t"].unit_given or self._time_is_text or is_time_unit):
+            if _count_on([cells[self._places["t"]] for cells in body]):
+                columns, notes = step.of(columns), (f"{columns['t'].name} counts rows: one each {step}",)
+                units.pop("t")
+        self._columns, of_units = columns.in_units_of_file(units)
+        self._notes = (*_front_note(lines, layout), *notes, *of_units)
         self._sample = body
 
     def _is_row(self, cells: Sequence[str]) -> bool:
@@ -217,9 +247,36 @@ def _layout(lines: Sequence[str], columns: Columns) -> Layout | None:
     numbered = [one.name for one in columns.named.values() if one.name.isdecimal()]
     if numbered:
         found = find(lines, [*columns.wanted, *numbered])
-        if found is not None and all(name in found.names for name in numbered):
+        head = (split(lines[found.header - 1], found.separator) or []) if found is not None and found.header else []
+        if all(name in head for name in numbered):
             return found
     return find(lines, columns.wanted, [int(name) - 1 for name in numbered])
+
+
+def _numbered(blocks_of: Callable[[], Iterator[bytes]], layout: Layout) -> Iterator[bytes]:
+    """Blocks with a last cell: the number of the row."""
+    separator, number, rows = layout.separator.encode(), 0, 0
+    head = b""
+    for block in blocks_of():
+        lines = block.split(b"\n")
+        for k, line in enumerate(lines[:-1] if block.endswith(b"\n") else lines):
+            number += 1
+            if number == layout.header:
+                head = line
+            if number < layout.body or not line.strip() or _NO_DATA.match(line):
+                continue
+            lines[k] = line + separator + (b"t" if line == head else str(rows).encode())
+            rows += line != head
+        yield b"\n".join(lines)
+
+
+def _count_on(cells: Sequence[str]) -> bool:
+    """Whether they are whole numbers, each one more than the one before it."""
+    try:
+        numbers = [int(cell) for cell in cells]
+    except ValueError:
+        return False
+    return len(numbers) > 1 and all(b == a + 1 for a, b in pairwise(numbers))
 
 
 def _front_note(lines: Sequence[str], layout: Layout) -> tuple[str, ...]:

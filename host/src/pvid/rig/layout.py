@@ -281,13 +281,16 @@ def _with_head(
     names = [str(k + 1) for k in range(width)] if head is None else list(head[1])
     while len(names) > width and not names[-1]:
         names.pop()
+    ended = not any(one.cells[-1] for one in usual)  # each row ends with a separator
+    if head is not None and len(names) > width and _are_settings(lines, head[0], width - ended):
+        names = [*names[: width - ended], *[""] * ended]
     if len(names) == width + 1 and names[-1].lower() in _REMARKS:
         names.pop()
     elif len(names) == width - 1:
-        if not any(one.cells[-1] for one in usual):
-            names.append("")  # each row ends with a separator
-        elif _counts([one.cells[0] for one in usual]):
-            names.insert(0, "")  # numbers of the rows
+        if ended:
+            names.append("")
+        elif _counts([one.cells[0] for one in usual]) or not any(one.cells[0] for one in usual):
+            names.insert(0, "")  # numbers of the rows, or each row begins with a separator
     wanted, positions = sought
     if all(name in names for name in wanted):
         used = {*(names.index(name) for name in wanted), *positions}
@@ -300,11 +303,11 @@ def _with_head(
     if wide:
         first = wide[0].number
     between = [one for one in lines if number < one.number < first and not one.is_blank] if head else []
-    units = next((one for one in between if _are_units(one, len(names))), None)
+    units = next((one for one in between if _units(one, len(names))), None)
     return Layout(
         separator,
         tuple(names),
-        () if units is None else tuple(units.bare),
+        () if units is None else tuple(_units(units, len(names))),
         number,
         0 if units is None else units.number,
         first,
@@ -334,7 +337,7 @@ def _guessed(lines: Sequence[_Line], first: int, width: int, numbers: Sequence[i
         held = [one for one in before if one.is_comment and len(one.bare) == width and not _are_numbers(one)]
         return (held[-1], held[-1].bare) if held else None
     for k, one in enumerate(text[:-1]):
-        if _are_units(one, width):
+        if _units(one, width):
             return text[k + 1], text[k + 1].cells
     if all(is_unit(cell) for cell in text[-1].cells if cell):  # the names are in a line of another width, or nowhere
         above = [one for one in before if one.number < text[-1].number and not one.is_comment][-1:]
@@ -346,18 +349,27 @@ def _guessed(lines: Sequence[_Line], first: int, width: int, numbers: Sequence[i
     return text[0], text[0].cells
 
 
+def _are_settings(lines: Sequence[_Line], head: _Line, width: int) -> bool:
+    """Whether what a line of names has behind the columns are settings: `t0 = 1`, or numbers in the line below it."""
+    below = next((one.cells for one in lines if one.number == head.number + 1), [])
+    behind = [(k, cell) for k, cell in enumerate(head.cells) if k >= width and cell]
+    return all("=" in cell or (k < len(below) and is_number(below[k])) for k, cell in behind)
+
+
 def _are_numbers(line: _Line) -> bool:
     return all(is_number(cell) for cell in line.bare)
 
 
-def _are_units(line: _Line, width: int) -> bool:
-    """Whether a line states units: half of its cells or more, the others being blank or words, and no number."""
-    cells = line.bare
-    if len(cells) != width or "n" in line.kinds:
-        return False
-    filled = [cell for cell in cells if cell]
-    known = sum(is_unit(cell) for cell in filled)
-    return known > 0 and 2 * known >= len(filled)
+def _units(line: _Line, width: int) -> list[str]:
+    """The units that a line states: half of its cells or more, the others being blank or words, and no number; [] of
+    any other. Behind the columns there may be settings."""
+    for cells in (line.bare, line.cells):
+        filled = [cell for cell in cells[:width] if cell]
+        known = sum(is_unit(cell) for cell in filled)
+        if len(cells) >= width and not any(map(is_number, filled)) and known and 2 * known >= len(filled):
+            if len(cells) == width or all(is_number(cell) for cell in cells[width:] if cell):
+                return cells[:width]
+    return []
 
 
 def _counts(cells: Sequence[str]) -> bool:

@@ -172,7 +172,7 @@ def read_table(path: Path, columns: Columns) -> Table:
             raise PvidError(f"{path} does not exist.")
         if not path.is_file():
             raise PvidError(f"{path} is not a regular file.")
-        return _read_as(path)(path, columns)
+        return _forward(_read_as(path)(path, columns))
     except (OSError, ValueError) as error:
         raise PvidError(f"{path} cannot be read: {reason(error)}.") from error
     except MemoryError as error:
@@ -199,7 +199,7 @@ def recording_of_arrays(
     """
     names = [str(one) for one in named]
     arrays = dict(zip(names, named.values(), strict=True))
-    return _recording(_checked(table_of(Path(name), names, arrays.__getitem__, columns)), rate)
+    return _recording(_checked(_forward(table_of(Path(name), names, arrays.__getitem__, columns))), rate)
 
 
 def write_recording(path: str | os.PathLike[str], recording: Recording, channels: tuple[Channel, ...]) -> None:
@@ -230,6 +230,16 @@ def write_recording(path: str | os.PathLike[str], recording: Recording, channels
 def is_run(path: Path) -> bool:
     """Whether a file's name is that of a recorded run."""
     return path.name.lower().endswith(tuple(_READERS))
+
+
+def _forward(table: Table) -> Table:
+    """With the first row in front of a table that begins with the last one."""
+    last = table.t.size - 1
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(table.t)
+    if not steps.size or not (steps <= 0).all() or not table.t[0] > table.t[-1]:
+        return table
+    return table.rows(slice(None, None, -1), lambda row: table.place(last - row), "the last row comes first: turned")
 
 
 def _checked(table: Table) -> Table:
@@ -389,7 +399,6 @@ _CONVERTED = {
     ".xls": "save it as .xlsx",
     ".ods": "save it as .xlsx",
     ".json": "write its rows as CSV",
-    ".jsonl": "write its rows as CSV",
     ".npy": "numpy.savez('RUN.npz', t=..., and an array for each signal)",
     ".pkl": "write the data frame with to_parquet or to_csv",
     ".zip": "unpack it",

@@ -101,10 +101,12 @@ def _table(path: Path, arrays: dict[str, Array], columns: Columns, units: dict[s
     last = Counter(name.rpartition(".")[2] for name in arrays)
     short = {name: name.rpartition(".")[2] for name in arrays}
     wanted = {*columns.wanted}
+    ends = {one: [name for name in arrays if f".{name}".endswith(f".{one}")] for one in wanted if "." in one}
     # By the whole path where that is wanted or needed, else by its last part.
     names = {
         name if name in wanted or last[short[name]] > 1 or short[name] in arrays else short[name]: name
         for name in arrays
     }
+    names.update({one: found[0] for one, found in ends.items() if len(found) == 1})
     stated = {shown: units[name] for shown, name in names.items() if name in units}
     return table_of(path, list(names), lambda name: arrays[names[name]], columns, stated)

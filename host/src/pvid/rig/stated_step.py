@@ -1,0 +1,81 @@
+"""The time from row to row that the text in front of a table states: `# dt = 0.001 s`, `Sample Rate: 2 kHz`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from pvid.base.units import scale_to
+from pvid.rig.columns import Column, Columns
+from pvid.rig.layout import Layout, split
+
+_SAMPLING = r"(?:sampl\w*|scan|logging|acquisition|data|abtast\w*)"
+_STATED = re.compile(
+    rf"""(?<![A-Za-z])
+    (?: (?P<rate> f_?s | (?:{_SAMPLING}[ _-]*)?rate | {_SAMPLING}[ _-]*freq\w* | abtastfrequenz)
+      | d[ _]?t | t_?s | [tx]_?incr?\w* | delta[ _]?(?:t|x|time) | increment | abtastzeit | messintervall
+      | (?:{_SAMPLING}|time|horizontal|measur\w*)?[ _-]*(?:interval|period|step|increment) | sampl\w*[ _-]*time )
+    \s* (?:[\[(](?P<bracket>[^\])]+)[\])] | in\s+(?P<word>[A-Za-zµ/]+))?
+    "?\s*[:=,;\t ]["\s:=,;]*
+    (?P<number>\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) \s* (?P<unit>[A-Za-zµ/]*)""",
+    re.X | re.I,
+)
+_RATE = re.compile(r"(?P<prefix>[kM]?)(?:Hz|Sa?/s|sps|samples/s(?:ec)?|1/s)?", re.I)
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Step:
+    """Seconds from row to row, and the line that states them."""
+
+    seconds: float
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.seconds:g} s, as line {self.line} states"
+
+    def of(self, columns: Columns) -> Columns:
+        """With the column of time as one that counts rows."""
+        rate = round(1 / self.seconds)
+        whole = rate > 0 and abs(rate * self.seconds - 1) < _SAME
+        name = columns["t"].name
+        column = (
+            Column(name, divisor=float(rate), unit_given=True) if whole else Column(name, self.seconds, unit_given=True)
+        )
+        return replace(columns, named=MappingProxyType({**columns.named, "t": column}))
+
+
+def stated_step(front: Sequence[str], layout: Layout) -> Step | None:
+    """Of the lines in front of the first row; None where none states it, or two contradict each other."""
+    found = [
+        Step(seconds, number) for number, line in _statements(front, layout) if (seconds := _seconds(line, layout))
+    ]
+    agree = all(abs(one.seconds / found[0].seconds - 1) < _SAME for one in found)
+    return found[0] if found and agree else None
+
+
+def _statements(front: Sequence[str], layout: Layout) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers; settings beside the names have their numbers in the line below."""
+    for number, line in enumerate(front, 1):
+        yield number, line
+        if number == layout.header and number < len(front):
+            below = (split(one, layout.separator) or [] for one in (line, front[number]))
+            yield from ((number + 1, f"{name}={cell}") for name, cell in zip(*below, strict=False))
+
+
+def _seconds(line: str, layout: Layout) -> float:
+    """That a line states; 0 of any other."""
+    match = _STATED.search(line)
+    if match is None:
+        return 0.0
+    text = match["number"].partition(",")[0] if layout.separator == "," else match["number"].replace(",", ".")
+    number, unit = float(text), match["unit"] or match["bracket"] or match["word"] or ""
+    if number <= 0:
+        return 0.0
+    if match["rate"]:
+        rate = _RATE.fullmatch(unit)
+        return 0.0 if rate is None else 1 / (number * {"": 1.0, "k": 1e3, "m": 1e6}[rate["prefix"].lower()])
+    scale = scale_to("s", unit or "s")
+    return 0.0 if scale is None else number * scale.factor / scale.divisor
