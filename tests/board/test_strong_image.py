@@ -6,14 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from in_process import pvid
+from motor_run import motor_equations
+from motor_run import recording as motor_recording
 
 from bench.kinds import KINDS
 from pvid.base.console import DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
+from pvid.board.strong_image import compare_on_board
 from pvid.compare.strong import StrongComparison
 from pvid.configuration.strong import strong_design
 from pvid.identification import strong
+from pvid.model import Model
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
@@ -68,6 +72,17 @@ def test_the_board_has_the_hash_of_the_twin(body: Path, target: str) -> None:
     assert done.return_value == DONE
     for core, host, board in zip(("f32", "q31"), lines[::2], lines[1::2], strict=True):
         assert host[2].strip() == core and host[6] == board[6] and len(host[6].strip()) == 8
+
+
+def test_constraints_have_the_hash_of_the_twin_on_a_board() -> None:
+    model = Model("motor with two constants")
+    unknowns = "R:ohm:1 L:H:1e-3 ke:V*s/rad:0.05 kt:N*m/A:0.05 J:kg*m^2:1e-4 b:N*m*s/rad:1e-4"
+    own = motor_equations(model, "ke", "kt", unknowns)
+    model.constraint(own["ke"] - own["kt"])
+    whole = motor_recording()
+    part = Recording(whole.t[:TICKS], {name: x[:TICKS] for name, x in whole.signals.items()}, whole.sample_rate)
+    run = StrongComparison.of(model.compiled("motor_two_constants"), part)
+    assert run.found.equal and compare_on_board("mps2-an386", run, "").equal
 
 
 @pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long) for one in KINDS])

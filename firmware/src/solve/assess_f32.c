@@ -127,6 +127,9 @@ void pvid_assess_f32(pvid_system_f32 *system, const pvid_solve_settings_f32 *set
     const bool known = pvid_cholesky_factor_f32(&factor, settings->n_p, (const float (*)[PVID_MAX_P])system->s);
     if (known) {
         pvid_cholesky_inverse_f32(&factor, estimate->covariance);
+#if PVID_MAX_CONSTRAINTS > 0
+        pvid_constraints_spread_f32(&system->ties, settings->n_p, estimate->covariance);
+#endif
     }
     pvid_assess_scale_f32(settings, wide, known, estimate);
 }

@@ -21,6 +21,9 @@
 /* A constraint is met within this part of a large step. */
 #define MET 1.0e-4f
 
+/* Of a step that leads too far from the constraints. */
+#define HALVINGS 4u
+
 /* A large step of a parameter: itself where positive, else start_sd. */
 static float reach_of(const pvid_solve_settings_f32 *settings, const float p[], size_t a)
 {
@@ -167,6 +170,23 @@ void pvid_constraints_project_f32(const pvid_constraints_f32 *self, size_t n, fl
     }
 }
 
+void pvid_constraints_reduce_f32(pvid_system_f32 *system, const pvid_model_f32 *model,
+                                 const pvid_solve_settings_f32 *settings, const float p[])
+{
+    const size_t n_p = settings->n_p;
+    system->ties.count = 0;
+    if (model->n_constraints == 0u) {
+        return;
+    }
+    pvid_constraints_at_f32(&system->ties, model, settings, p);
+    pvid_constraints_shift_f32(&system->ties, n_p, (const float (*)[PVID_MAX_P])system->s, system->force);
+    pvid_constraints_project_f32(&system->ties, n_p, system->s, system->force);
+    for (size_t k = 0; k < system->ties.count; k++) {
+        const size_t place = system->ties.place[k];
+        system->s[place][place] = 3.0f * settings->prior[place];
+    }
+}
+
 void pvid_constraints_complete_f32(const pvid_constraints_f32 *self, size_t n, float dp[])
 {
     for (size_t k = 0; k < self->count; k++) {
@@ -215,6 +235,28 @@ PVID_COLD bool pvid_constraints_return_f32(const pvid_model_f32 *model, const pv
         pvid_constraints_at_f32(&ties, model, settings, p);
     }
     return ties.off <= MET;
+}
+
+bool pvid_constraints_end_f32(const pvid_model_f32 *model, const pvid_solve_settings_f32 *settings,
+                              const float before[], float p[])
+{
+    const size_t n_p = settings->n_p;
+    float whole[PVID_MAX_P];
+    float part = 1.0f;
+    for (size_t a = 0; a < n_p; a++) {
+        whole[a] = p[a] - before[a];
+    }
+    for (size_t left = HALVINGS; left > 0u; left--) {
+        if (pvid_constraints_return_f32(model, settings, p, PVID_RETURNS_OF_STEP)) {
+            return true;
+        }
+        part *= 0.5f;
+        for (size_t a = 0; a < n_p; a++) {
+            p[a] = before[a] + (part * whole[a]);
+        }
+    }
+    memcpy(p, before, n_p * sizeof p[0]);
+    return false;
 }
 
 #endif

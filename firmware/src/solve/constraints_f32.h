@@ -8,11 +8,10 @@
  * only where there are no others. Private to the core. Source: theory.md 4, Constraints.
  *
  *   if (!pvid_constraints_return_f32(model, settings, p, RETURNS)) ...       p to g(p) = 0
- *   pvid_constraints_at_f32(&ties, model, settings, p);
- *   pvid_constraints_shift_f32(&ties, n, s, force);                          F - S n
- *   pvid_constraints_project_f32(&ties, n, s, force);                        C^T S C, C^T F
+ *   pvid_constraints_reduce_f32(&system, model, settings, p);                C^T S C, C^T (F - S n)
  *   ... a solve ...
  *   pvid_constraints_complete_f32(&ties, n, dp);                             n + C pi
+ *   if (!pvid_constraints_end_f32(model, settings, before, p)) ...           and back to g(p) = 0
  *   pvid_constraints_spread_f32(&ties, n, covariance);                       C V C^T
  */
 #ifndef PVID_CONSTRAINTS_F32_H
@@ -21,6 +20,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "pvid/detail/estimator_state.h"
 #include "pvid/estimator.h"
 
 #if PVID_MAX_CONSTRAINTS > 0
@@ -34,6 +34,11 @@ void pvid_constraints_at_f32(pvid_constraints_f32 *self, const pvid_model_f32 *m
 
 /* F -= S n: what the return to the constraints changes of F. s: upper triangle. */
 void pvid_constraints_shift_f32(const pvid_constraints_f32 *self, size_t n, const float s[][PVID_MAX_P], float force[]);
+
+/* S and F at p become those of the independent parameters; the others have S as with four times their prior
+ * information. Writes system->ties. Cost: those of `at` and `project`. */
+void pvid_constraints_reduce_f32(pvid_system_f32 *system, const pvid_model_f32 *model,
+                                 const pvid_solve_settings_f32 *settings, const float p[]);
 
 /* S <- C^T S C, and F <- C^T F unless it is NULL; rows and columns of dependent parameters are 0, their diagonal too.
  * Cost: n_p^2 m multiplications. */
@@ -49,6 +54,11 @@ void pvid_constraints_spread_f32(const pvid_constraints_f32 *self, size_t n, flo
  * is met: to 1e-4 of a large step. */
 bool pvid_constraints_return_f32(const pvid_model_f32 *model, const pvid_solve_settings_f32 *settings, float p[],
                                  size_t steps);
+
+/* The same for p after a step: shortened to half until Newton's steps lead there. Fails (returns false, p = before) iff
+ * four halvings do not. */
+bool pvid_constraints_end_f32(const pvid_model_f32 *model, const pvid_solve_settings_f32 *settings,
+                              const float before[], float p[]);
 
 #endif
 

@@ -46,9 +46,6 @@ enum {
 #define ROWS_PER_STAGE 3u
 #define COLUMNS_PER_STAGE 2u
 
-/* Of a step that leads too far from the constraints. */
-#define HALVINGS 4u
-
 /* ---- rows ---- */
 
 /* e = y - N^T theta and, while g < 1, gradient = C^T N, by theta and the pattern of C, for a row of this block. */
@@ -151,23 +148,11 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
     return solve->index < model->n_p;
 }
 
-/* S and F of the independent parameters; the others have S as with four times their prior information. */
+/* S and F of the independent parameters. */
 static void constrain(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
 #if PVID_MAX_CONSTRAINTS > 0
-    pvid_system_f32 *system = &solve->system;
-    const size_t n_p = self->model->n_p;
-    system->ties.count = 0;
-    if (self->model->n_constraints == 0u) {
-        return;
-    }
-    pvid_constraints_at_f32(&system->ties, self->model, &self->settings, self->p);
-    pvid_constraints_shift_f32(&system->ties, n_p, (const float (*)[PVID_MAX_P])system->s, system->force);
-    pvid_constraints_project_f32(&system->ties, n_p, system->s, system->force);
-    for (size_t k = 0; k < system->ties.count; k++) {
-        const size_t place = system->ties.place[k];
-        system->s[place][place] = 3.0f * self->settings.prior[place];
-    }
+    pvid_constraints_reduce_f32(&solve->system, self->model, &self->settings, self->p);
 #else
     (void)self;
     (void)solve;
@@ -229,29 +214,14 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
     solve->size = solution.size;
 }
 
-/* The step ends on the constraints: shortened to half until Newton's steps lead there. */
+/* The step ends on the constraints. */
 static void return_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
 #if PVID_MAX_CONSTRAINTS > 0
-    float whole[PVID_MAX_P];
-    float part = 1.0f;
-    if ((self->model->n_constraints == 0u) || (solve->reason != PVID_UPDATED) || solve->in_dead_zone) {
-        return;
+    const bool tied = (self->model->n_constraints > 0u) && (solve->reason == PVID_UPDATED) && !solve->in_dead_zone;
+    if (tied && !pvid_constraints_end_f32(self->model, &self->settings, self->p, solve->p)) {
+        solve->reason = pvid_count_held(&self->counters, PVID_HELD_SINGULAR);
     }
-    for (size_t a = 0; a < self->model->n_p; a++) {
-        whole[a] = solve->p[a] - self->p[a];
-    }
-    for (size_t left = HALVINGS; left > 0u; left--) {
-        if (pvid_constraints_return_f32(self->model, &self->settings, solve->p, PVID_RETURNS_OF_STEP)) {
-            return;
-        }
-        part *= 0.5f;
-        for (size_t a = 0; a < self->model->n_p; a++) {
-            solve->p[a] = self->p[a] + (part * whole[a]);
-        }
-    }
-    solve->reason = pvid_count_held(&self->counters, PVID_HELD_SINGULAR);
-    memcpy(solve->p, self->p, sizeof solve->p);
 #else
     (void)self;
     (void)solve;

@@ -5,6 +5,7 @@
  *   STRONG_P, _KINDS, _SIGNALS, _CHANNELS, _INPUTS, _ATOMS, _SUMS, _S     counts; S: entries of a triangle of S
  *   STRONG_WEIGHT                                                         place of the weight among the sums
  *   STRONG_POSITIVE, STRONG_HELD                                          bits of p > 0; whether an input is held
+ *   STRONG_CONSTRAINTS, tied                                              how many; a model with them alone
  *   STRONG(verb), strong_f32, strong_config_f32, ..                       names of its functions and types
  *   inputs_of_five, inputs_of_bank, atoms_of, innovate, ..                its functions
  *
@@ -27,6 +28,7 @@
 #include "pvid/fnv_word.h"
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
+#include "solve/constraints_f32.h"
 #include "solve/settings_f32.h"
 #include "solve/step_f32.h"
 #include "strong/differentiator_f32.h"
@@ -242,6 +244,44 @@ static inline bool window_step(strong_window_f32 *self, const pvid_fir_bank_f32 
     return true;
 }
 
+/* ---- what this form shares with the other ---- */
+
+static PVID_COLD void settings_of(const strong_estimator_f32 *self, pvid_solve_settings_f32 *settings)
+{
+    memset(settings, 0, sizeof *settings);
+    settings->row_variance = self->row_sd * self->row_sd;
+    settings->correlation = self->config->estimator.correlation;
+    settings->n_p = STRONG_P;
+    for (size_t a = 0; a < STRONG_P; a++) {
+        settings->prior[a] = self->prior[a];
+        settings->start_sd[a] = sqrtf(settings->row_variance / self->prior[a]);
+#if STRONG_CONSTRAINTS > 0
+        settings->lower[a] = self->config->estimator.lower[a];
+        settings->upper[a] = self->config->estimator.upper[a];
+#endif
+    }
+#if STRONG_CONSTRAINTS > 0
+    settings->gain = self->gain;
+    settings->step_limit = self->config->estimator.step_limit;
+    settings->kappa_min = self->config->estimator.kappa_min;
+    settings->positive = (pvid_p_bits)STRONG_POSITIVE;
+    settings->blocked = self->blocked;
+#endif
+}
+
+/* A symmetric matrix from its upper triangle by rows. */
+static PVID_COLD void unpack(const float s[STRONG_S], float whole[][PVID_MAX_P])
+{
+    size_t next = 0;
+    for (size_t a = 0; a < STRONG_P; a++) {
+        for (size_t b = a; b < STRONG_P; b++) {
+            whole[a][b] = s[next];
+            whole[b][a] = s[next];
+            next++;
+        }
+    }
+}
+
 /* ---- configuration ---- */
 
 static PVID_COLD void folds_init(strong_estimator_f32 *self, float forgetting_rows)
@@ -278,6 +318,23 @@ static PVID_COLD pvid_status weights_init(strong_estimator_f32 *self, const stro
     return PVID_OK;
 }
 
+/* p to the constraints. Fails iff there is no such p near it, or the law leaves F where it is: there is no force that
+ * a constraint could take. */
+static PVID_COLD pvid_status tie(strong_estimator_f32 *self)
+{
+#if STRONG_CONSTRAINTS > 0
+    if (self->mixes) {
+        return (self->config->estimator.law == PVID_LAW_STATIONARY) ? PVID_BAD_FEEDBACK : PVID_BAD_LAW;
+    }
+    pvid_solve_settings_f32 settings;
+    settings_of(self, &settings);
+    return pvid_constraints_return_f32(&tied, &settings, self->p, PVID_RETURNS_AT_INIT) ? PVID_OK : PVID_BAD_START;
+#else
+    (void)self;
+    return PVID_OK;
+#endif
+}
+
 static PVID_COLD pvid_status estimator_init(strong_estimator_f32 *self, const strong_config_f32 *config, float rate_hz)
 {
     pvid_estimator_config_f32 estimator = config->estimator;
@@ -307,7 +364,8 @@ static PVID_COLD pvid_status estimator_init(strong_estimator_f32 *self, const st
                    (divider <= FOLD_MAX) && long_enough;
     memcpy(self->p, estimator.start, sizeof self->p);
     folds_init(self, forgetting_rows);
-    return weights_init(self, config);
+    const pvid_status weighted = weights_init(self, config);
+    return (weighted == PVID_OK) ? tie(self) : weighted;
 }
 
 static PVID_COLD pvid_status prepare(strong_f32 *self, const strong_config_f32 *config)
@@ -402,31 +460,6 @@ static PVID_NOINLINE void fold(strong_estimator_f32 *self, size_t first, size_t 
 
 /* ---- accuracy ---- */
 
-static PVID_COLD void settings_of(const strong_estimator_f32 *self, pvid_solve_settings_f32 *settings)
-{
-    memset(settings, 0, sizeof *settings);
-    settings->row_variance = self->row_sd * self->row_sd;
-    settings->correlation = self->config->estimator.correlation;
-    settings->n_p = STRONG_P;
-    for (size_t a = 0; a < STRONG_P; a++) {
-        settings->prior[a] = self->prior[a];
-        settings->start_sd[a] = sqrtf(settings->row_variance / self->prior[a]);
-    }
-}
-
-/* A symmetric matrix from its upper triangle by rows. */
-static PVID_COLD void unpack(const float s[STRONG_S], float whole[][PVID_MAX_P])
-{
-    size_t next = 0;
-    for (size_t a = 0; a < STRONG_P; a++) {
-        for (size_t b = a; b < STRONG_P; b++) {
-            whole[a][b] = s[next];
-            whole[b][a] = s[next];
-            next++;
-        }
-    }
-}
-
 /* S, and the residuals at p. With P = Q + sum p_l g_l over the linear parameters l,
  *
  *   sum (Y - P)^2 = sum (Y - Q)^2 - sum_l p_l (R_l + F_l),   R_l = sum g_l (Y - Q) = F_l + sum_m p_m S_lm */
@@ -476,6 +509,11 @@ void STRONG(assess)(const strong_f32 *self, pvid_estimate_f32 *estimate)
     pvid_solve_settings_f32 settings;
     settings_of(&self->estimator, &settings);
     system_of(&self->estimator, &system);
+#if STRONG_CONSTRAINTS > 0
+    pvid_constraints_reduce_f32(&system, &tied, &settings, self->estimator.p);
+#elif PVID_MAX_CONSTRAINTS > 0
+    system.ties.count = 0;
+#endif
     memcpy(estimate->p, self->estimator.p, sizeof self->estimator.p);
     pvid_assess_f32(&system, &settings, estimate);
     pvid_trust_add_shared_f32(self->estimator.config->shared, STRONG_P, STRONG_POSITIVE, estimate);
@@ -514,6 +552,51 @@ typedef enum {
     STAGED_STEP        /* which follows at the next row */
 } work;
 
+/* Parameters that a force or a step pulls out of their bounds. Equation (5) alone has no solution to stay at. */
+static PVID_COLD pvid_p_bits outwards(const strong_estimator_f32 *self, const float pull[STRONG_P])
+{
+    const pvid_estimator_config_f32 *config = &self->config->estimator;
+    const bool stays = self->gain > 0.0f;
+    return stays ? pvid_step_outwards_f32(STRONG_P, self->p, config->lower, config->upper, pull) : 0u;
+}
+
+#if STRONG_CONSTRAINTS > 0
+/* The step on the constraints, theory.md 4, (6c): of S and F from all rows, by the functions of the other form. */
+static PVID_COLD pvid_reason solve(strong_estimator_f32 *self, const float rhs[STRONG_P], bool projected)
+{
+    pvid_system_f32 system;
+    pvid_solve_settings_f32 settings;
+    pvid_cholesky_f32 factor;
+    float p[STRONG_P];
+    pvid_solution_f32 solution = {.p = p};
+    (void)projected; /* always: at_every_row */
+    settings_of(self, &settings);
+    unpack(self->s, system.s);
+    memcpy(system.force, rhs, sizeof p);
+    pvid_constraints_reduce_f32(&system, &tied, &settings, self->p);
+    for (size_t a = 0; a < STRONG_P; a++) {
+        system.s[a][a] += self->prior[a];
+    }
+    self->pinned = pvid_step_pin_f32(&system, &settings, self->p);
+    pvid_reason reason = pvid_step_factor_f32(&system, &settings, &factor);
+    if (reason == PVID_UPDATED) {
+        memcpy(p, self->p, sizeof p);
+        pvid_step_take_f32(&system, &settings, &factor, self->pinned, self->p, system.force, &solution);
+        pvid_count_step(&self->counters, solution.limited, solution.bounded);
+        self->blocked = (pvid_p_bits)((solution.blocked != 0u) ? (solution.blocked | (uint32_t)self->pinned) : 0u);
+        reason = solution.reason;
+    }
+    if ((reason == PVID_UPDATED) && !pvid_constraints_end_f32(&tied, &settings, self->p, p)) {
+        reason = PVID_HELD_SINGULAR;
+    }
+    if (reason != PVID_UPDATED) {
+        return pvid_count_held(&self->counters, reason);
+    }
+    memcpy(self->p, p, sizeof p);
+    pvid_count_up(&self->counters.updates);
+    return reason;
+}
+#else
 /* Stops p at its bounds. */
 static PVID_COLD void clamp(strong_estimator_f32 *self)
 {
@@ -556,14 +639,6 @@ static inline pvid_reason move(strong_estimator_f32 *self, const float dp[STRONG
     }
     pvid_count_up(&self->counters.updates);
     return PVID_UPDATED;
-}
-
-/* Parameters that a force or a step pulls out of their bounds. Equation (5) alone has no solution to stay at. */
-static PVID_COLD pvid_p_bits outwards(const strong_estimator_f32 *self, const float pull[STRONG_P])
-{
-    const pvid_estimator_config_f32 *config = &self->config->estimator;
-    const bool stays = self->gain > 0.0f;
-    return stays ? pvid_step_outwards_f32(STRONG_P, self->p, config->lower, config->upper, pull) : 0u;
 }
 
 /* A step from a projection that would move a parameter out of its bound is not taken; the parameter is pinned in the
@@ -610,6 +685,7 @@ PVID_ALWAYS_INLINE pvid_reason solve(strong_estimator_f32 *self, const float rhs
     }
     return (reason == PVID_UPDATED) ? reason : pvid_count_held(&self->counters, reason);
 }
+#endif
 
 /* S and the right-hand side at p from all rows and this one: rhs = g F + (1 - g) rhs, where rhs is the sum of C^T N e
  * of the rows since the last projection. The square of this row is not in S yet. */
@@ -624,7 +700,7 @@ static inline void project_all(strong_estimator_f32 *self, const strong_gradient
         force[a] += own[a];
         rhs[a] = (self->gain * force[a]) + ((1.0f - self->gain) * rhs[a]);
     }
-    if (self->counters.bounded > 0u) {
+    if ((STRONG_CONSTRAINTS == 0) && (self->counters.bounded > 0u)) {
         self->pinned = (pvid_p_bits)(outwards(self, force) | (uint32_t)self->blocked);
     }
 }
@@ -635,7 +711,10 @@ PVID_ALWAYS_INLINE work at_every_row(strong_estimator_f32 *self, const strong_gr
     const uint32_t left = self->phase;
     force_of(row, self->weight, rhs);
     self->phase = (uint16_t)(((left == 0u) ? self->exact_every : left) - 1u);
-    return (left == 0u) ? PROJECTED_STEP : LAZY_STEP;
+    if (left == 0u) {
+        return PROJECTED_STEP;
+    }
+    return (STRONG_CONSTRAINTS > 0) ? ROW_ALONE : LAZY_STEP; /* the force of a row alone is no reaction */
 }
 
 /* Rows of a staged round, by their number from 1; the last has number 0. The projection is at row 1. */

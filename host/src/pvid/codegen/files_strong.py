@@ -172,6 +172,13 @@ def files_of(strong: StrongFunctions, command: str) -> dict[str, str]:
     return {f"{name}.h": header(strong, command), f"{name}_f32.c": source(strong, command)}
 
 
+def sizes_of(strong: StrongFunctions) -> dict[str, int]:
+    """Of the core's arrays, but for the window."""
+    model = strong.functions.model
+    tied = {"PVID_MAX_CONSTRAINTS": len(model.constraints)} if model.constraints else {}
+    return {"PVID_MAX_P": len(model.unknowns), **tied}
+
+
 def header(strong: StrongFunctions, command: str) -> str:
     """NAME_strong.h; `strong` has the name NAME_strong."""
     functions, sums = strong.functions, strong_sums_of(strong)
@@ -197,7 +204,7 @@ def header(strong: StrongFunctions, command: str) -> str:
         "Samples:",
         *describe.table(samples),
         "",
-        f"The library must be compiled with PVID_MAX_P >= {n_p}.",
+        f"The library must be compiled with {' and '.join(f'{a} >= {b}' for a, b in sizes_of(strong).items())}.",
         "Not thread-safe. Never allocates.",
         "",
         *describe.everything(functions),
@@ -230,9 +237,15 @@ def header(strong: StrongFunctions, command: str) -> str:
         '#include "pvid/gate.h"',
         '#include "pvid/misfit.h"',
         "",
-        f"#if PVID_MAX_P < {n_p}",
-        f'#error "compile pvid and this file with -DPVID_MAX_P={n_p}"',
-        "#endif",
+        *(
+            line
+            for macro, size in sizes_of(strong).items()
+            for line in (
+                f"#if {macro} < {size}",
+                f'#error "compile pvid and this file with -D{macro}={size}"',
+                "#endif",
+            )
+        ),
         "",
         *for_cpp([*(f"#define {upper}_{what} {count}" for what, count in counts.items()), "", text, ""]),
     ]
@@ -252,6 +265,7 @@ def source(strong: StrongFunctions, command: str) -> str:
         *_rows(sums),
         *_equations(sums),
         *_integrals(strong),
+        *_constraints(strong),
         '#include "strong/strong_f32.h"',
     ]
     return "\n\n".join(parts) + "\n"
@@ -282,6 +296,7 @@ def _names(strong: StrongFunctions, sums: StrongSums) -> str:
             f"#define STRONG_S {n_p * (n_p + 1) // 2}",
             f"#define STRONG_POSITIVE {positive}u",
             f"#define STRONG_HELD {int(any(strong.held))}",
+            f"#define STRONG_CONSTRAINTS {len(strong.functions.model.constraints)}",
             f"#define STRONG_HELD_CHANNELS {{{held}}}",
             f"#define STRONG_UNITS {{{units}}}",
             f"#define STRONG_LINEAR {{{linear}}}",
@@ -480,6 +495,23 @@ def _integrals(strong: StrongFunctions) -> list[str]:
     return [
         c_functions.float_function(signature, inner.program),
         _INTEGRATE.format(count=count, places="\n".join(places)),
+    ]
+
+
+def _constraints(strong: StrongFunctions) -> list[str]:
+    """What the elimination of theory.md (6b) is given."""
+    function = strong.functions.constraints
+    if not function.labels:
+        return []
+    signature = "static void constraints(const float in[], float out[])"
+    count = len(strong.functions.model.constraints)
+    return [
+        _commented(
+            f"Each constraint g(p) = 0 and its derivatives by p, theory.md (6b): {'; '.join(function.labels)}.",
+            c_functions.float_function(signature, function.program),
+        ),
+        "static const pvid_model_f32 tied = {"
+        f".n_p = STRONG_P, .n_constraints = {count}u, .constraints = constraints}};",
     ]
 
 

@@ -72,7 +72,7 @@ void pvid_replay_inputs_f32({name}_f32 *self, uint32_t ticks, const float inputs
 
 def sizes_of_strong(strong: StrongFunctions, config: StrongModelConfig | None = None) -> dict[str, int]:
     """Sizes of the core's arrays that the strong form of a model needs; `config`: with this bank."""
-    needed = {"PVID_MAX_P": len(strong.functions.model.unknowns)}
+    needed = files_strong.sizes_of(strong)
     return needed if config is None else {**needed, "PVID_MAX_WINDOW": config.memory}
 
 

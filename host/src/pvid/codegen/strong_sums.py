@@ -84,8 +84,7 @@ class Innovation:
 
 
 def strong_sums_of(strong: StrongFunctions) -> StrongSums:
-    """The sums of a strong form, named NAME_strong; PvidError where it has constraints."""
-    strong.functions.model.refuse_constraints("the printed strong form")
+    """The sums of a strong form, named NAME_strong."""
     found = _Rows(strong)
     found.find_shift()
     found.choose_units()

@@ -24,7 +24,7 @@ from pvid.twin.printer.values import filled
 from pvid.twin.state import take_over
 
 _CORE = (
-    *("assess_f32", "cholesky_f32", "differentiator_f32", "elementary_f32", "finite_f32"),
+    *("assess_f32", "cholesky_f32", "constraints_f32", "differentiator_f32", "elementary_f32", "finite_f32"),
     *("fnv", "gate_f32", "misfit_f32", "settings_f32", "trust_f32"),
 )
 _MADE_BY = "the twin"
@@ -53,7 +53,7 @@ class StrongModelTwin:
 
     def __init__(self, strong: StrongFunctions, config: StrongModelConfig) -> None:
         self._name = strong.functions.name
-        sizes = {"PVID_MAX_P": len(strong.functions.model.unknowns), "PVID_MAX_WINDOW": config.memory}
+        sizes = {**files_strong.sizes_of(strong), "PVID_MAX_WINDOW": config.memory}
         self._module = printed_module(
             [source(f"{one}.c") for one in _CORE],
             [*PUBLIC_FOLDERS, SRC],

@@ -153,8 +153,11 @@ def _last(reasons: list[int]) -> Reason:
 
 
 def _unknown(model: CompiledModel, p: Float, error: Float) -> Iterator[str]:
-    """Parameters at a bound, or with a standard error that leaves nothing of them."""
+    """Parameters at a bound, or with a standard error that leaves nothing of them; not the margin of an inequality."""
+    in_rows = {symbol for row in model.rows for theta in row.theta for symbol in theta.free_symbols}
     for one, value, own in zip(model.unknowns, p, error, strict=True):
+        if one.symbol not in in_rows:
+            continue
         bound = UNKNOWN * abs(value) if one.positive else _UNKNOWN_OF_RANGE * (one.high - one.low)
         rim = 1e-5 * abs(value) if one.positive else 0.0
         if not own <= bound or value <= one.low + rim or value >= one.high - rim:

@@ -357,7 +357,7 @@ class CompiledModel:
         if self.constraints:
             raise PvidError(
                 f"{self.name} has constraints between its unknowns, which {what} does not keep: the weak form in "
-                "float64 and float32 does, and `--form strong --core f64`"
+                "float64 and float32 does, and `--form strong`"
             )
 
     def refuse_robot(self, what: str = "this command") -> None:
