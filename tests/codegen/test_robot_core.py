@@ -18,6 +18,8 @@ from pvid.cli.main import commands
 from pvid.codegen.files_robot import RobotFiles, board_report, refuse_in_c
 from pvid.codegen.robot_library import RobotNative, RobotTwin
 from pvid.configuration.robot_core import robot_core_design
+from pvid.identification.robot import answer_of_robot
+from pvid.identification.robot_core import answer_of_robot_in_c
 from pvid.model import Robot
 from pvid.model.chain import Chain
 from pvid.oracle.weak.robot import identify_robot
@@ -170,6 +172,33 @@ def test_a_file_of_a_robot_becomes_c(tmp_path: Path, monkeypatch: pytest.MonkeyP
     text = 'import sys; sys.path.insert(0, "built"); import arm_twin; print(arm_twin.pvid_robot_step_f32(None, None))'
     told = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False)
     assert told.stdout.strip() == str(int(Reason.NOT_READY)), told.stderr
+
+
+def test_identify_prints_what_the_core_finds() -> None:
+    model, design, samples = made("spatial", 2)
+    run = {one: samples[:, k] for k, one in enumerate(RobotFiles(model, "").samples)}
+    recording = Recording(np.arange(len(samples)) / ARMS["spatial"], run, ARMS["spatial"])
+    native = RobotNative(model, design)
+    native.run(samples)
+    p, se, number = native.read()
+    answer = answer_of_robot_in_c(recording, model)
+    assert [one.value for one in answer.values.values()] == p.tolist() and answer.number == number
+    of_noise = np.array([one.se_noise or 0.0 for one in answer.values.values()])
+    np.testing.assert_allclose(of_noise, se.astype(float), rtol=1e-4)
+    told = answer.as_json()
+    assert told["core"] == "f32" and told["prediction"]["tau1"]["r2"] > 0.99 and answer.verdict.word == "good"
+    wanted = answer_of_robot(recording, model).as_json()["prediction"]["tau1"]["rms"]
+    assert told["prediction"]["tau1"]["rms"] == pytest.approx(wanted, rel=0.1)
+    turned = run | {"q1": (run["q1"] + np.pi) % (2 * np.pi) - np.pi}  # an encoder that starts again each turn
+    turned["tau3"] = np.where(np.arange(len(samples)) == 4000, np.nan, run["tau3"])
+    again = answer_of_robot_in_c(Recording(recording.t, turned, recording.sample_rate), model)
+    assert max(abs(a.value - b) / (a.se or 0) for a, b in zip(again.values.values(), p.tolist(), strict=True)) < 1
+    for seconds, begun in ((2.6, False), (4.0, True)):  # of the longer one no half has an estimate
+        size = int(seconds * ARMS["spatial"])
+        short = {name: one[:size] for name, one in run.items()}
+        answer = answer_of_robot_in_c(Recording(recording.t[:size], short, recording.sample_rate), model)
+        assert answer.identified == begun and not answer.prediction and "predicts" not in "".join(answer.lines)
+        assert begun or "the core has no estimate" in answer.verdict.reasons[0].text
 
 
 def test_what_the_core_does_not_take_is_refused_in_a_sentence() -> None:

@@ -235,7 +235,7 @@ OTHERS = {
     "tune": "tune log.csv --model robot.py",
     "plot": "plot log.csv --model robot.py -o figure.png",
     "validate": "validate log.csv --from answer.json --model robot.py",
-    "core": "identify log.csv --model robot.py --core f32",
+    "core": "identify log.csv --model robot.py --core q31",
     "refine": "identify log.csv --model robot.py --refine",
     "report": "identify log.csv --model robot.py --report report.html",
     "add": "identify log.csv --model robot.py --add k*q1",

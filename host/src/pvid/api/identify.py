@@ -19,6 +19,7 @@ from pvid.identification.core import identify_in_c
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
 from pvid.identification.robot import answer_of_robot
+from pvid.identification.robot_core import answer_of_robot_in_c
 from pvid.identification.summary import Made
 from pvid.log.rig import source_of
 from pvid.log.rig_choice import common_rig, rig_of
@@ -121,8 +122,9 @@ def identify_typed(
         of_each = own_of(compiled, recording, own, shared, in_c=in_c is not None)
         options = {"model": model, "rig": rig, "columns": columns, "core": core, "refine": refine, **settings}
         made = Made.of(_call(paths, options), files, rig_path, found)
-        if compiled.chain is not None and not (in_c or refine or own or shared):
-            return result_of(answer_of_robot(recording, compiled), made, columns)
+        if compiled.chain is not None and core != "q31" and not (refine or own or shared):
+            robot = answer_of_robot_in_c if in_c else answer_of_robot
+            return result_of(robot(recording, compiled), made, columns)
         answer = identified(recording, compiled, refine=False if in_c else refine, own=of_each)
         return result_of(answer if in_c is None else identify_in_c(answer, in_c.name), made, columns)
 

@@ -35,6 +35,7 @@ from pvid.settings.enums import Core, Law
 
 if TYPE_CHECKING:
     from pvid.identification.core import CoreAnswer
+    from pvid.identification.robot import RobotAnswer
     from pvid.identification.validation import Validation
     from pvid.model.compiled import CompiledModel
 
@@ -197,10 +198,12 @@ def _identified_robot(
 ) -> int:
     """Identifies recordings of a robot and prints the answer."""
     from pvid.identification.robot import answer_of_robot, payload_of
+    from pvid.identification.robot_core import answer_of_robot_in_c
 
     for option, value in asked.items():
-        if value and option not in ("--core f64", "--form weak"):
+        if value and option not in ("--core f64", "--core f32", "--form weak"):
             rig.compiled().refuse_robot(option)
+    identify = answer_of_robot_in_c if asked.get("--core f32") else answer_of_robot
     source = None
     if written is not None:
         from pvid.identification.robot_writing import source_of as source_of_robot
@@ -208,7 +211,7 @@ def _identified_robot(
         source = source_of_robot(rig.model, written)
     recording, model = recordings_of(paths, rig, columns)
     with working("identifying"):
-        answer = answer_of_robot(recording, model)
+        answer: RobotAnswer = identify(recording, model)
     if written is not None and source is not None and answer.identified:
         from pvid.identification.robot_writing import write_robot
 
@@ -223,7 +226,7 @@ def _identified_robot(
         more = {"validation": {"prediction": {one.name: one.as_json() for one in found}}}
         lines = [f"{other}: the answer predicts {listed(found)}"]
     if empty is not None:
-        without = answer_of_robot(recordings_of([empty], rig, columns)[0], model)
+        without = identify(recordings_of([empty], rig, columns)[0], model)
         payload = payload_of(answer, without)
         more["payload"] = _values_json(payload)
         lines += [f"{empty}: {one.text}" for one in without.verdict.reasons]

@@ -193,7 +193,8 @@ class RobotAnswer(Answer):
             *(f"{chain.name_of(one)} = {chain.closed_form(one)}" for one in combined),
             *self.impossible,
         ]
-        return [*lines, f"predicts torques that were not fitted: {listed(self.prediction)}"]
+        told = [f"predicts torques that were not fitted: {listed(self.prediction)}"] if self.prediction else []
+        return [*lines, *told]
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
@@ -232,6 +233,11 @@ def sure(fit: RobotFit) -> tuple[Lacking, ...]:
 def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
     """Base parameters of a robot from all segments of a recording. Raises PvidError when the recording is too short."""
     fit = identify_robot(model, recording.run, recording.sample_rate)
+    return RobotAnswer(model, fit, values_of(model, fit), recording)
+
+
+def values_of(model: CompiledModel, fit: RobotFit) -> dict[str, Value]:
+    """Parameters of an estimate with their errors, of noise, gains and what is missing."""
     scale: Float = _gains(model)[:, np.newaxis] * fit.by_gain
     sizes, directions = np.linalg.eigh(fit.covariance)
     noise = directions * np.sqrt(np.maximum(sizes, 0.0))
@@ -250,7 +256,7 @@ def answer_of_robot(recording: Recording, model: CompiledModel) -> RobotAnswer:
             unknown.unit, float(fit.p[k]), math.hypot(*parts), parts[0], se_scale=parts[1], se_model=parts[2],
             factors=factors,
         )  # fmt: skip
-    return RobotAnswer(model, fit, values, recording)
+    return values
 
 
 def _moved(fit: RobotFit) -> Float:

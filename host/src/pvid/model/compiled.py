@@ -363,7 +363,7 @@ class CompiledModel:
     def refuse_robot(self, what: str = "this command") -> None:
         """PvidError by what takes no robot."""
         if self.chain is not None:
-            in_c = "" if self.chain.free else ", and `pvid model build` prints its C"
+            in_c = "" if self.chain.free else ", and --core f32 by the C that `pvid model build` prints"
             raise PvidError(
                 f"{self.name} is a robot, which {what} does not take: `pvid identify` in float64 does{in_c}"
             )
