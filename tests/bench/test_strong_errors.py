@@ -51,3 +51,14 @@ def test_starts_are_a_factor_off_and_the_forms_converge_from_twice_the_truth() -
     assert [row[:3] for row in found] == [("kapitza", "weak", "3"), ("kapitza", "strong", "3")]
     assert all(row[4:7] == ("100 %",) * 3 for row in found)
     assert all(len(row) == len(strong.RADIUS_HEADER) for row in found)
+
+
+def test_one_norm_of_all_rows_halves_the_errors_of_outputs_with_common_noise() -> None:
+    """By sqrt(1 - 0.9^2) = 0.44 where Y alone is noisy; of a single equation there is no norm to choose."""
+    (row,) = strong.norm_rows(["kapitza"], 20, lambda: None)
+    found = dict(zip(strong.NORM_HEADER, row, strict=True))
+    assert found["mechanism"] == "two outputs, common noise" and float(found["correlation"]) == pytest.approx(
+        0.9, abs=0.01
+    )
+    assert 0.3 < float(found["ratio: median"]) < 0.65
+    assert (found["products of M: apart"], found["in one"]) == ("2", "3")

@@ -61,6 +61,13 @@ CASES = (
         rows=(("starts", "RADIUS_HEADER", "radius_rows"),),
     ),
     Case(
+        "norm",
+        "The strong form with all rows of an instant in one norm, beside rows that are weighted apart.",
+        "strong",
+        options=_number("--seeds", 80),
+        rows=(("strong-norm", "NORM_HEADER", "norm_rows"),),
+    ),
+    Case(
         "refine-mechanisms",
         "Both stages in C: errors beside the Cramer-Rao bound.",
         "refine_mechanisms",

@@ -1,4 +1,5 @@
-"""The strong form in C beside the weak form: errors with finer and finer encoders, and from how far they start."""
+"""The strong form in C beside the weak form: errors with finer and finer encoders, and from how far they start; and
+what the paper's norm of all rows of an instant gives, beside rows that are weighted apart."""
 
 from __future__ import annotations
 
@@ -17,10 +18,14 @@ from pvid.codegen.weak_library import weak_native
 from pvid.configuration.strong import reference_of, strong_design
 from pvid.configuration.weak import samples_of, weak_config
 from pvid.identification.analysis import analysed
-from pvid.model.compiled import Signal
+from pvid.model import Model
+from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import order_of
+from pvid.oracle.strong_described import StrongModel, StrongRows, StrongSettings, all_rows, residuals
 from pvid.oracle.weak.edges import with_edges
 from pvid.oracle.weak.identify import Identified
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.solve import least_squares_step
 from pvid.rig.run import Recording
 from pvid.sim.simulated_run import SOFT, RigSimulation, simulation_of
 
@@ -35,6 +40,10 @@ CLOSE, LEAST = 2.0, 0.01  # of what a start may change: standard errors, or of t
 HEADER = columns(
     "mechanism | sensors finer | window s | runs | RMS %: strong | weak | strong over weak: median | largest | of | "
     "in 2 s.e. %: strong | weak"
+)
+NORM_HEADER = columns(
+    "mechanism | kinds | correlation | runs | RMS %: apart | in one norm | ratio: median | least | largest | scatter: "
+    "ratio | mean error over scatter | products of M: apart | in one"
 )
 RADIUS_HEADER = ("mechanism", "form", "starts", "all converge within", *(f"x {one:g}" for one in FACTORS))
 
@@ -195,3 +204,91 @@ def radius_rows(names: Sequence[str], runs: int, advance: Advance) -> Iterator[t
             reached = [f for k, f in enumerate(FACTORS) if min(share[: k + 1]) == 1.0]
             within = f"x {reached[-1]:g}" if reached else "none"
             yield (name, word, str(runs), within, *(f"{100 * one:.0f} %" for one in share))
+
+
+def in_one_norm(parameters: Parameters, rows: StrongRows, start: Float) -> tuple[Float, Float]:
+    """p with the inverse covariance W of the residuals of an instant as the weight of its rows, which the paper's norm
+    is then: S = sum W_kl C_k^T M_kl C_l; and that covariance [kinds, kinds]."""
+    p, kinds = start, range(len(rows.known))
+    m = [[rows.regressors[k].T @ rows.regressors[j] for j in kinds] for k in kinds]
+    b = [[rows.regressors[k].T @ rows.known[j] for j in kinds] for k in kinds]
+    covariance = np.eye(len(kinds))
+    for _ in range(12):  # from the estimate of rows apart: it changes little
+        covariance = np.atleast_2d(np.cov(residuals(parameters, rows, p)))
+        weights, theta, c = np.linalg.inv(covariance), parameters.theta(p), parameters.jacobian(p)
+        s, f = np.diag(parameters.prior(start)), np.zeros(len(p))
+        for k, j in ((k, j) for k in kinds for j in kinds):
+            s = s + weights[k, j] * c[k].T @ m[k][j] @ c[j]
+            f = f + weights[k, j] * c[k].T @ (b[k][j] - m[k][j] @ theta[j])
+        p = parameters.moved(p, least_squares_step(parameters, p, s, f))
+    return p, covariance
+
+
+def common_mode() -> tuple[CompiledModel, Callable[[int], Run], Float]:
+    """Two outputs of two drives, whose sensors share nine tenths of their noise: model, runs, truth."""
+    model = Model("two outputs")
+    y = [model.sensor(f"y{k}", "", noise=0.3) for k in (1, 2)]
+    for one, name in zip(y, "ab", strict=True):
+        u = model.input(f"u{name}", "", "sampled")
+        model.equation(one - model.unknown(name, "", 1.0) * u)
+    truth = np.array([1.2, 0.7])
+
+    def run(seed: int) -> Run:
+        rng = np.random.default_rng(seed)
+        u, noise = rng.normal(size=(2, 4000)), rng.normal(size=(3, 4000))
+        y = truth[:, np.newaxis] * u + 0.3 * (np.sqrt(0.9) * noise[0] + np.sqrt(0.1) * noise[1:])
+        return {"y1": y[0], "y2": y[1], "ua": u[0], "ub": u[1]}
+
+    return model.compiled("two_outputs"), run, truth
+
+
+def norm_rows(names: Sequence[str], seeds: int, advance: Advance) -> Iterator[tuple[str, ...]]:
+    """A row of NORM_HEADER for each mechanism with several rows at an instant, in float64 with the window of C."""
+    for name in ["two outputs, common noise", *names] if names else []:
+        if name not in names:
+            (model, run_of, truth), rate, settings = common_mode(), 1.0, StrongSettings(5, 4, 4)
+            size = truth
+        else:
+            simulation = as_sampled(simulation_of(name))
+            model, rate = simulation.model, simulation.rig.sample_rate
+            truth, size = np.asarray(simulation.truth), size_of(simulation)
+            try:
+                if len(StrongModel(model).model.rows) < 2:
+                    continue
+                fitted = strong_design(model, _recorded(simulation)).fitted
+            except PvidError as error:
+                yield _refused(name, len(NORM_HEADER), error)
+                continue
+            settings = StrongSettings(fitted.taps, fitted.degree, 4)
+
+            def run_of(seed: int, one: RigSimulation = simulation) -> Run:
+                return one.run(seed, SOFT)
+
+        oracle = StrongModel(model)
+        errors: list[list[Float]] = [[], []]
+        correlation = 0.0
+        for seed in range(seeds):
+            run = run_of(seed)
+            rows = oracle.rows({one.name: run[one.name] for one in model.signals}, rate, settings)
+            apart, _ = all_rows(oracle.parameters, rows, truth)
+            whole, covariance = in_one_norm(oracle.parameters, rows, apart)
+            sd = np.sqrt(np.diag(covariance))
+            correlation += np.max(np.abs(covariance / np.outer(sd, sd) - np.eye(len(sd)))) / seeds
+            for own, p in zip(errors, (apart, whole), strict=True):
+                own.append((p - truth) / size)
+            advance()
+        both = [rms(np.array(one)) for one in errors]
+        scatter = [np.std(one, axis=0) for one in errors]
+        ratios, counts = both[1] / both[0], [n.shape[1] for n in rows.regressors]
+        products = (sum(n * (n + 1) // 2 for n in counts), sum(counts) * (sum(counts) + 1) // 2)
+        yield (
+            name,
+            str(len(counts)),
+            f"{correlation:.2f}",
+            str(seeds),
+            *(f"{100 * float(np.median(one)):.3g}" for one in both),
+            *(f"{one:.3g}" for one in (np.median(ratios), np.min(ratios), np.max(ratios))),
+            f"{np.median(scatter[1] / scatter[0]):.3g}",
+            f"{np.median(np.abs(np.mean(errors[0], axis=0)) / scatter[0]):.3g}",
+            *map(str, products),
+        )
