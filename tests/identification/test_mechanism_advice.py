@@ -188,6 +188,33 @@ def test_unit_of_the_time_is_named(name: str, unit: str, scale: float, what: str
     assert advice_on(found) == (f"t seems to be in {what}, not s: --columns t=t:{unit}",)
 
 
+@pytest.mark.parametrize(
+    ("name", "sensor", "offset", "shift"),
+    [
+        ("ring_down", "x", "x0", 0.011),
+        ("ring_down", "x", "x0", 0.5),
+        ("mass_on_spring", "x", "x0", -2.0),
+        ("rc_step", "v", "v0", 9.0),
+        ("dc_motor", "i", "i0", 20.0),
+    ],
+)
+def test_where_a_sensor_reads_0_is_no_suspicion_of_units(name: str, sensor: str, offset: str, shift: float) -> None:
+    """Of offsets beyond the range of the guess the answer is that of the sensor without a shift."""
+    model, simulation = compiled_of(name), simulation_of(name)
+    run = {key: values[:8000] for key, values in simulation.run(3).items()}
+    t = run.pop("t")
+    usual, found = (
+        analysed(Recording(t, {**run, sensor: run[sensor] + by}, simulation.rig.sample_rate), model)
+        for by in (0.0, shift)
+    )
+    assert found.identified and advice_on(found) == ()
+    assert "range" not in {one.name for one in found.found.verdict.reasons}
+    for one, before in usual.values.items():
+        after, by = found.values[one].value, shift if one == offset else 0.0
+        assert after is not None and before.value is not None and before.se is not None
+        assert abs(after - before.value - by) <= 2 * before.se + 0.01 * abs(by)
+
+
 STEP = 2 * np.pi / 2**14
 
 

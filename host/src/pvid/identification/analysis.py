@@ -14,7 +14,7 @@ from pvid.identification.values import values_of_found
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import feedthroughs
 from pvid.model.normalise import with_own_scales
-from pvid.model.together import offsets, with_own
+from pvid.model.together import offsets, shifted_sensors, with_own
 from pvid.oracle.weak import work
 from pvid.oracle.weak.edges import with_edges
 from pvid.oracle.weak.failures import attempted
@@ -41,7 +41,8 @@ def analysed(
     """
     model.refuse_robot()
     refuse_constant(recording, model)
-    model = with_edges(as_sampled(model, recording.ticks_between), recording.run, recording.sample_rate)
+    model = with_offsets_of(as_sampled(model, recording.ticks_between), recording)
+    model = with_edges(model, recording.run, recording.sample_rate)
     names = [one.name for one in recording.origins]
     whole = with_own(model, own, names)
     found = identify(whole, recording.run, recording.sample_rate, weights=weights)
@@ -157,6 +158,23 @@ def as_sampled(model: CompiledModel, ticks_between: Mapping[str, float]) -> Comp
         rounding = 1 / 12 if one.resolution else 0.0
         signals.append(replace(one, noise=float(np.sqrt(between * (rounding + one.noise**2) - rounding))))
     return replace(model, signals=tuple(signals))
+
+
+def with_offsets_of(model: CompiledModel, recording: Recording) -> CompiledModel:
+    """The model in which an offset of a sensor that never comes near its plausible range may be wherever the samples
+    are, and starts at their median; without a drive, where a mechanism comes to rest, if that is beyond the range."""
+    at_rest = not any(one.kind == "input" or one.driven for one in model.signals)
+    unknowns = list(model.unknowns)
+    for k, one in enumerate(unknowns):
+        shifted = shifted_sensors(model, one)
+        if one.positive or np.isfinite(one.bounds).any() or len(shifted) != 1:  # of two it is the difference
+            continue
+        [(name, sign)] = shifted
+        low, guess, high = np.nanquantile(sign * recording.signals[name], [0.0, 0.5, 1.0]).tolist()
+        if not (one.low <= guess <= one.high if at_rest else one.low <= high and low <= one.high):
+            sd = max(one.sd, abs(guess - one.guess))
+            unknowns[k] = replace(one, guess=guess, sd=sd, low=min(one.low, low), high=max(one.high, high))
+    return replace(model, unknowns=tuple(unknowns))
 
 
 def refuse_constant(recording: Recording, model: CompiledModel) -> None:

@@ -26,23 +26,22 @@ def offsets(model: CompiledModel) -> tuple[str, ...]:
     """
     since_start = any(one.has(Integral) for one in model.opaque.values())
     return tuple(
-        one.name
-        for one in model.unknowns
-        if (not one.positive or since_start) and shifted_sensor(model, one) is not None
+        one.name for one in model.unknowns if (not one.positive or since_start) and shifted_sensors(model, one)
     )
 
 
-def shifted_sensor(model: CompiledModel, unknown: Unknown) -> tuple[str, int] | None:
-    """The sensor that an unknown shifts, and 1 where the unknown is its reading at the zero of the equations, -1 where
-    minus that; None where there is none."""
+def shifted_sensors(model: CompiledModel, unknown: Unknown) -> list[tuple[str, int]]:
+    """The sensors that an unknown shifts, each with 1 where the unknown is its reading at the zero of the equations, -1
+    where minus that."""
+    found = []
     for signal in model.signals:
         if signal.kind != "sensor" or unknown.unit != signal.unit:
             continue
         slopes = [(sp.diff(one, unknown.symbol), sp.diff(one, signal.jet)) for one in model.equations]
         for sign in (1, -1):
-            if all(sp.expand(a + sign * b) == 0 for a, b in slopes):
-                return signal.name, sign
-    return None
+            if any(a != 0 for a, _ in slopes) and all(sp.expand(a + sign * b) == 0 for a, b in slopes):
+                found.append((signal.name, sign))
+    return found
 
 
 def with_own(model: CompiledModel, own: Iterable[str], recordings: Sequence[str]) -> CompiledModel:

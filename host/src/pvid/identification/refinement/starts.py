@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from pvid.identification.values import output_at
 from pvid.model.compiled import CompiledModel
-from pvid.model.together import shifted_sensor
+from pvid.model.together import shifted_sensors
 from pvid.oracle.weak.identify import Identified
 from pvid.rig.run import NUMBER
 
@@ -59,8 +59,8 @@ def _guess(model: CompiledModel, signals: Mapping[str, Float]) -> Float:
     """The guesses, with the offset of a sensor at its median."""
     out = []
     for one in model.unknowns:
-        shifted = None if one.positive else shifted_sensor(model, one)
-        at = one.guess if shifted is None else shifted[1] * float(np.nanmedian(signals[shifted[0]]))
+        shifted = [] if one.positive else shifted_sensors(model, one)
+        at = shifted[0][1] * float(np.nanmedian(signals[shifted[0][0]])) if shifted else one.guess
         out.append(at if abs(at - one.guess) <= _NEAR * one.sd else one.guess)
     return np.array(out, np.float64)
 
