@@ -181,8 +181,9 @@ def test_what_changes_during_a_run_or_with_a_large_signal_is_named_with_its_size
 def test_change_in_the_course_of_a_run_has_a_name_only_if_it_explains_nearly_all() -> None:
     """A friction that depends on the place follows the amplitude: Tc seems to change, and that leaves 1.8 of a chi^2 of
     6, where 1.5 and a twentieth are allowed."""
-    found = told(campaign(200, 90210)[46], 90210)
-    assert found is not None and "friction of a place" in found.case.words
+    (friction,) = (one for one in effects_of("bob") if one.name == "friction of a place (q)")
+    found = told(Case(46, "bob", ((friction, 0.028176),)), 90210)
+    assert found is not None
     named = found.found.found.named
     assert named is not None and not named.complete and isinstance(named.named[0].chosen.kind, Course)
     assert not found.found.named and found.found.found.verdict.status != "good"
@@ -237,8 +238,11 @@ def test_course_scores_as_its_column() -> None:
 
 def test_term_that_takes_the_place_of_a_parameter_has_no_name() -> None:
     """A motor whose back EMF's constant would be next to nothing, and w.d() in its place."""
-    case = campaign(80, 4711)[62]
-    found = told(case, 4711)
+    drift, limited = (
+        next(one for one in effects_of("motor") if one.name == f"{name} (V)")
+        for name in ("drift of the gain", "limited rate")
+    )
+    found = told(Case(62, "motor", ((drift, 0.086556), (limited, 0.016769))), 4711)
     assert found is not None and not found.named_wrongly and found.found.found.verdict.status != "good"
 
 
@@ -383,6 +387,33 @@ def test_what_no_term_explains_has_no_name() -> None:
     assert found.verdict.status == "warning" and "sensor" not in [one.name for one in found.verdict.reasons]
     assert found.named is None or not found.named.complete
     assert np.all(np.abs(found.p - simulation_of("battery_2rc").truth) < 4 * found.se)
+
+
+@pytest.mark.parametrize("size", [0.6, 1.2])
+def test_what_a_parameter_imitates_is_named_beside_what_is_left_of_it(size: float) -> None:
+    """A spring is next to gravity's sine at 0.7 rad: the cube of the angle explains as much, and hardly moves w2."""
+    spring = Effect("swing", "spring to the frame", ("q",), (), lambda s, t: s[0])
+    done = outcome(replace(PLANTS["swing"], start=(0.7, 0.0)), 1, (spring, size))
+    assert np.all(done.off < 2 * done.found.se) and done.off[1] > 0.02 * done.found.p[1]
+    assert done.found.verdict.status == "warning"
+    assert re.search(r"lack [\d.]+\*q(,|$)", ",".join([done.named[0].text, *done.named[0].instead]))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_in_few_windows_the_sensors_noise_tells_what_is_missing(seed: int) -> None:
+    """1 % of c, 4 of its standard errors; Student's quantile of 9 degrees of freedom alone would ask for 18."""
+    drag = next(one for one in effects_of("swing") if one.name.startswith("square drag"))
+    done = outcome(PLANTS["swing"], seed, (drag, 0.0003))
+    assert len(done.found.times) < 20 and done.off[0] > 0.01 * done.found.p[0]
+    assert done.off[0] < 2 * done.found.se[0] and done.named[0].law == "abs(q.d())*q.d()"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 5])
+def test_halves_that_excite_less_than_the_whole_run_agree(seed: int) -> None:
+    """The bench of a rotor has no force that is known: noise in its motion would make its mass smaller in each half."""
+    found = outcome(PLANTS["rotor"], seed).found
+    assert found.halves is not None and np.max(found.halves.clash) < 4
+    assert found.verdict.status == "good" and np.all(found.se < 0.15 * found.p)
 
 
 @pytest.mark.parametrize("freedom", [1.5, 9, 36.5, 20_000])

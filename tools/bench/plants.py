@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from math import pi, sin, tanh
+from math import cos, pi, sin, tanh
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.model import Model
+from pvid.model import cos as cosine_of
 from pvid.model import sgn as sign_of
 from pvid.model import sin as sine_of
 from pvid.model.compiled import CompiledModel
@@ -373,6 +374,30 @@ def _shaft(s: States, M: float, more: States, p: Values) -> States:
 
 
 @cache
+def _rotor_model() -> CompiledModel:
+    """An unbalance shakes a bench on springs, whose equation has no force that is known."""
+    model = Model("rotor")
+    M = model.input("M", "N*m", hold="zoh", reach=5, gain_sd=0)
+    q = model.sensor("q", "rad", resolution=2 * pi / 2**13, reach=5000)
+    y = model.sensor("y", "m", resolution=2e-6, reach=0.05, gain_sd=0)
+    J, b, Tc = model.unknown("J", "kg*m^2", 0.01), model.unknown("b", "N*m*s", 0.01), model.unknown("Tc", "N*m", 0.05)
+    u, m = model.unknown("u", "kg*m", 0.02), model.unknown("m", "kg", 5)
+    c, k = model.unknown("c", "N*s/m", 20), model.unknown("k", "N/m", 5000)
+    model.equation(J * q.d(2) + b * q.d() + Tc * sign_of(q.d()) + u * y.d(2) * cosine_of(q) - M)
+    model.equation(m * y.d(2) + c * y.d() + k * y + u * (q.d(2) * cosine_of(q) - q.d() ** 2 * sine_of(q)))
+    return model.compiled("rotor")
+
+
+def _rotor(s: States, M: float, more: States, p: Values) -> States:
+    q, y, dq, dy = s[:4]
+    torque = M - p["b"] * dq - p["Tc"] * tanh(dq / 0.15) - more[0]
+    force = p["u"] * dq**2 * sin(q) - p["c"] * dy - p["k"] * y - more[1]
+    coupling = p["u"] * cos(q)
+    whole = p["J"] * p["m"] - coupling**2
+    return (dq, dy, (p["m"] * torque - coupling * force) / whole, (p["J"] * force - coupling * torque) / whole)
+
+
+@cache
 def _cell_model() -> CompiledModel:
     """Its overvoltage is not measured."""
     model = Model("cell")
@@ -393,6 +418,7 @@ def _cell_voltage(s: States, i: float, more: States, p: Values) -> float:
     return p["E"] - p["R0"] * i - s[0] - more[1]
 
 
+_ROTOR = {"J": 0.0143, "b": 0.005, "Tc": 0.05, "u": 0.03, "m": 4.0, "c": 25.0, "k": 7000.0}
 _MOTOR = {"R": 1.45, "L": 8e-3, "k": 0.043, "J": 2.6e-4, "b": 4e-4}
 _SERVO = {"R": 1.6, "k": 0.12, "J": 1.4e-3, "b": 1.5e-3, "Tc": 0.03}
 _SHAFT = {"J1": 1.5e-3, "J2": 4e-3, "k": 6.0, "d": 8e-3, "b1": 8e-3, "b2": 0.012}
@@ -535,6 +561,19 @@ PLANTS = {
             {"q": (0, 2 * pi / 2**16), "r": (1, 2 * pi / 2**16)},
             2.0,
             (Axis("q", 0, 1.0, 0, 2, angle=True, viscous="b1"), Axis("r", 1, 0.5, 1, 3, angle=True, viscous="b2")),
+        ),
+        Plant(
+            "rotor",
+            _rotor_model,
+            _ROTOR,
+            1000.0,
+            0.5,
+            _rotor,
+            4,
+            {"q": (0, 2 * pi / 2**13), "y": (1, 2e-6)},
+            0.3,
+            (Axis("q", 0, 0.3, 0, 2, angle=True, coulomb="Tc", viscous="b"), Axis("y", 1, 20.0, 1, 3, viscous="c")),
+            bias=0.15,
         ),
         Plant(
             "cell",

@@ -253,7 +253,8 @@ def _judged(
         if one.gain_sd > 0 or one.unit != "rad"
     }
     by_clock = or_nan(fit, lambda: library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
-    causes = tuple(shared.of_scale(library))
+    causes = shared.of_scale(library)
+    causes = attempt("gains that the run shows", lambda: shared.as_shown(library, causes)) or causes
     parts = [
         verdict.widened(found.se, halves),
         *(one.moves for one in causes),
@@ -316,7 +317,7 @@ def _judged(
         allowance=units,
         by_gain=by_gain,
         by_clock=by_clock,
-        causes=causes,
+        causes=tuple(causes),
         by_model=by_model,
         lacking=lacking,
         named=named,

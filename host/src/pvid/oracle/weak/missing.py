@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.oracle.weak import work
-from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
+from pvid.oracle.weak.errors import chi2_of_sensors, inflation, uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.rows import EquationError
@@ -29,7 +29,9 @@ from pvid.oracle.weak.terms import CONSTANT, JUMPS, OF_LOAD, OF_PARAMETER, UNUSU
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
 _CERTAIN = 6.0  # |size| over its standard error
-_CHANCE = 1e-8  # of a size beyond the limit, where the residuals are within the sensors' noise
+# Of a size beyond the limit, where the residuals are within the sensors' noise; of one that is six of its standard
+# errors besides, by how large that noise is.
+_CHANCE, _CHANCE_BESIDES = 1e-8, 1e-6
 _EMPTY = 0.3  # of the equations' own terms: a term that leaves less of them takes their place
 _BY_NOISE = 0.5  # of what a term explains: noise that is in it and in the residuals
 _SHARE = 0.01  # of the residuals' energy on unseen windows
@@ -64,10 +66,9 @@ _HALVINGS = 4  # of the distance of two jumps
 _PASSES = 3  # of whitening in a fit that begins near its end
 
 
-def _by_chance(windows: float, surest: float) -> float:
+def _by_chance(windows: float, surest: float, normal: float) -> float:
     """Standard errors, from the scatter of so many windows, that nothing reaches by chance: Student's, or the normal
     distribution's where the surest term does not even reach those."""
-    normal = -NormalDist().inv_cdf(_CHANCE)
     return normal if surest <= normal else student(windows)
 
 
@@ -113,23 +114,36 @@ class Missing:
         scored, p = scores.of(library.candidates), scores.fit.p
         chi2 = chi2_of_sensors(scores.fit)
         doubtful = chi2 < _NOISE  # the residuals are no sign that anything is missing
-        # Standard errors from the scatter of few windows, which overlap, are themselves uncertain.
+        # Standard errors from the scatter of few windows, which overlap, are themselves uncertain; those of the
+        # sensors' noise are not, where it is what is left.
         surest = max((one.certainty for one in scored), default=0.0)
-        least = _by_chance(len(scores.residuals) / 2, surest) if doubtful else _CERTAIN
-        there = tuple(
+        normal, besides = (-NormalDist().inv_cdf(one) for one in (_CHANCE, _CHANCE_BESIDES))
+        least = _by_chance(len(scores.residuals) / 2, surest, normal) if doubtful else _CERTAIN
+        overlap = inflation(scores.fit) ** 0.5 if doubtful and least > normal else 1.0
+
+        def sureness(one: Candidate) -> float:
+            by_noise = 0.0
+            if doubtful and np.any(np.abs(one.shift) > VISIBLE * np.abs(p)):
+                by_noise = min(one.certainty / normal, one.by_noise / overlap / besides)
+            return max(one.certainty / least, by_noise)
+
+        possible = [
             one
             for one in scored
-            if one.certainty > least * (max(1.0, _DISTINCT / max(one.own, 1e-300)) ** 0.5 if doubtful else 1.0)
+            if sureness(one) > 1
             if one.share > _SHARE and one.folds >= FOLDS - 1
             if fit is None or one.own > _DISTINCT
             if scores.leaves(one) > _EMPTY
             if one.share * chi2 * _BY_NOISE**2 > 1  # the noise in it explains at most 1 / chi2
             or scores.by_noise(one, library.noise, library.noise_in(one)) < _BY_NOISE
-        )
+        ]
+        leads = [not doubtful or sureness(one) > (_DISTINCT / max(one.own, 1e-300)) ** 0.5 for one in possible]
+        best = next((one.share for one, own in zip(possible, leads, strict=True) if own), np.inf)
+        there = tuple(one for one, own in zip(possible, leads, strict=True) if own or one.share > _RIVAL * best)
         plausible = [one for one in there if one.share >= _PLAUSIBLE * there[0].share]
-        shifts = np.array([one.shift for one in plausible if one.own > _DISTINCT or one is there[0]]).reshape(
-            -1, len(p)
-        )
+        shifts = np.array(
+            [one.shift for one in plausible if one.own > _DISTINCT or one.share > _RIVAL * there[0].share]
+        ).reshape(-1, len(p))
         error = np.max(np.abs(shifts), axis=0, initial=0.0)
         return cls(there, shifts, (error > MOVES * se) & (error > VISIBLE * np.abs(p)), scores)
 

@@ -461,7 +461,8 @@ class Candidate:
     weights : of a course, how far it is there in each window [windows]; None: all the time
     rows : of a law, names of the rows that contain it, and its sign in each
     size : estimate
-    certainty : |size| over its standard error
+    certainty : |size| over its standard error, from the scatter of the windows
+    by_noise : the same over that of residuals that are as large as their weights say
     own : part of the column's square that no change of p explains
     share : part of the residuals' energy on unseen windows that the term removes
     folds : parts of the run in which it does
@@ -479,6 +480,7 @@ class Candidate:
     rows: tuple[tuple[str, float], ...] = ()
     size: float = 0.0
     certainty: float = 0.0
+    by_noise: float = 0.0
     own: float = 0.0
     share: float = 0.0
     folds: int = 0

@@ -18,7 +18,7 @@ from pvid.oracle.weak.failures import FAILURES, Found, attempted
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import UNKNOWN, Parameters
 from pvid.oracle.weak.rows import WeakRows
-from pvid.oracle.weak.solve import Fit, Moments, gauss_newton, inverse, normal
+from pvid.oracle.weak.solve import Fit, Moments, compensated, gauss_newton, inverse, normal
 from pvid.oracle.weak.words import WIDE, Word, worst
 from pvid.oracle.weak.zero import upper_bound
 
@@ -375,7 +375,8 @@ def halves_of(fit: Fit) -> Halves | None:
     half = fit.rows.parts(2)
     for windows in (half == 0, half == 1):
         own = fit.only(windows)
-        p, _ = gauss_newton(own.parameters, Moments.of(own.white), own.p, own.parameters.prior(own.start), 30)
+        moments = compensated(own.rows, own.white, own.parameters.theta(own.p))
+        p, _ = gauss_newton(own.parameters, moments, own.p, own.parameters.prior(own.start), 30)
         moved = own.at(p)
         parts.append((p, uncertainty(moved).se))
     spread = np.hypot(parts[0][1], parts[1][1])
