@@ -148,6 +148,7 @@ AROUND: dict[str, tuple[str | bytes, str | None, str]] = {
         None,
         "",
     ),
+    "lines in quotes": (of(*(f'"{line}"' for line in (HEAD, *PLAIN))), None, ""),
     "pipes": (of("t|F|x", *("|".join(c) for c in CELLS)), None, ""),
     "table of markdown": (of("| t | F | x |", "|---|---|---|", *(f"| {' | '.join(c)} |" for c in CELLS)), None, ""),
     "blanks in columns": (
@@ -451,6 +452,7 @@ TIMES = {
     "compact": [one.strftime("%Y%m%d %H:%M:%S.%f") for one in AT],
     "minutes": [one.strftime("%M:%S.%f") for one in AT],
     "elapsed": [f"0:00:{2 * k / 1000:06.3f}" for k in range(ROWS)],
+    "days since": [f"0 days 00:00:{2 * k / 1000:09.6f}" for k in range(ROWS)],
     "epoch": [f"{one.replace(tzinfo=datetime.UTC).timestamp():.3f}" for one in AT],
 }
 

@@ -101,7 +101,10 @@ def split(line: str, separator: str, strict: bool = False) -> list[str] | None:
     if '"' in line:
         try:
             reader = csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)
-            return [cell.strip() for cell in next(reader)]
+            cells = [cell.strip() for cell in next(reader)]
+            return (
+                split(cells[0], separator, strict) if len(cells) == 1 and '"' not in cells[0] else cells
+            )  # a quoted line
         except csv.Error:
             if strict:
                 return None

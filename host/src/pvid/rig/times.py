@@ -17,7 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _DATE = r"""(?P<y>\d{4})[-/.](?P<mo>\d{1,2})[-/.](?P<d>\d{1,2}) | (?P<y8>\d{4})(?P<mo8>\d\d)(?P<d8>\d\d)
     | (?P<a>\d{1,2})(?P<mark>[-/.])(?P<b>\d{1,2})[-/.](?P<ye>\d{4}|\d\d)
-    | (?P<dn>\d{1,2})[- ](?P<name>[A-Za-z]{3})[A-Za-z]*[- ](?P<yn>\d{4})"""
+    | (?P<since>\d+)\ days?,? | (?P<dn>\d{1,2})[- ](?P<name>[A-Za-z]{3})[A-Za-z]*[- ](?P<yn>\d{4})"""
 _TIME = re.compile(
     rf"""(?P<day>(?:{_DATE})(?:[T_,;\ ]\s*|\ +))?
     (?P<clock>(?P<h>\d{{1,2}}):(?P<m>\d\d))
@@ -153,6 +153,8 @@ class TimesOfDay:
     def _day(self, match: re.Match[str]) -> int | None:
         """Number of a date; None of an impossible one."""
         self._days.add(match["day"].strip())
+        if match["since"]:
+            return int(match["since"])
         if match["a"]:
             first, second, year = int(match["a"]), int(match["b"]), int(match["ye"])
             month_first = second > 12 or (self._month_first and first <= 12)
