@@ -55,7 +55,7 @@ class Case:
 
 PENDULUM = {"g": 9.5, "l2": 0.12, "rho2": 0.08, "k1": 0.0, "k2": 0.0, "tau": 0.0}
 CASES = {
-    "kapitza": Case(4400, 4000, PENDULUM, ("g", 0.98)),
+    "kapitza": Case(4800, 4000, PENDULUM, ("g", 0.98)),
     "dc_motor": Case(2600, 2400, simulated_rig("dc_motor").truth, ("L", 0.3)),
     "heated_plate": Case(2600, 2400, {"C": 100.0, "h": 0.5}, ("h", 0.96)),
 }

@@ -120,6 +120,11 @@ def test_the_weak_form_in_integers_keeps_its_limits(measured: Measured) -> None:
         assert measured[sizes.Configuration(BOARDS[board], "weak", "q31")][1].state_bytes <= 4096, board
 
 
+def test_a_block_takes_three_times_the_mean_at_most(measured: Measured) -> None:
+    footprint = measured[sizes.Configuration(BOARDS["mps2-an386"], sizes.IN_BLOCKS, "f32")][0]
+    assert footprint.longest <= 3 * BLOCK * footprint.mean
+
+
 @pytest.mark.longer
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:
     footprints = {configuration: footprint for configuration, (footprint, _) in measured.items()}

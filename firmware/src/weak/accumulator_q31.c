@@ -2,6 +2,7 @@
 
 #include <stddef.h>
 
+#include "weak/steps.h"
 #include "weak/sums_q31.h"
 #include "weak/values_q31.h"
 
@@ -38,6 +39,14 @@ uint32_t pvid_weak_ticks_behind_join_q31(const pvid_weak_design_q31 *design)
     const uint32_t joining = ((2u * (uint32_t)pvid_weak_harmonics_q31(design)) + (each - 1u)) / each;
     const uint32_t all = other_ticks(design);
     return (all > joining) ? (all - joining) : 0u;
+}
+
+uint8_t pvid_weak_pace_q31(const pvid_weak_design_q31 *design, uint32_t stages, uint32_t columns)
+{
+    const uint32_t steps = PVID_WEAK_BLOCK_Q31;
+    const uint32_t all = other_ticks(design);
+    return pvid_weak_pace(stages, columns, design->hop / steps, steps, all / steps,
+                          all - pvid_weak_ticks_behind_join_q31(design));
 }
 
 void pvid_weak_accumulator_init_q31(pvid_weak_accumulator_q31 *self, const pvid_weak_design_q31 *design,

@@ -2,7 +2,8 @@
  *
  * The last tick of a step's D forms its channels. The others add a block of four steps to the sums, some harmonics a
  * tick, and at the end of a window join these; when nothing is to be added they are free for stages of the last whole
- * window. With D = 1 every tick does both. All other ticks only add their readings to the front end's block. */
+ * window, all or every second, fourth ... of them. With D = 1 every tick does both. All other ticks only add their
+ * readings to the front end's block. */
 #ifndef PVID_WEAK_ACCUMULATOR_Q31_H
 #define PVID_WEAK_ACCUMULATOR_Q31_H
 
@@ -23,6 +24,9 @@ uint32_t pvid_weak_free_ticks_q31(const pvid_weak_design_q31 *design);
 
 /* Those of them before the next half's first block is added. */
 uint32_t pvid_weak_ticks_behind_join_q31(const pvid_weak_design_q31 *design);
+
+/* The pace of so many stages of a window, `columns` of which read its sums: steps.h. */
+uint8_t pvid_weak_pace_q31(const pvid_weak_design_q31 *design, uint32_t stages, uint32_t columns);
 
 /* Returns whether PVID_MAX_BLOCKS are enough: one is where the ticks of a step add and join all harmonics. */
 bool pvid_weak_blocks_fit_q31(const pvid_weak_design_q31 *design);

@@ -2,8 +2,9 @@
  *
  * The last tick of a step's D forms its jets, the tick behind it the channels. The others add a block of eight steps to
  * the sums, some harmonics a tick, and at the end of a window join these; when nothing is to be added, they run stages
- * of the last whole window. Below 4 ticks jets and channels are of one tick; with D = 1 every tick does all. All other
- * ticks only add their samples to the front end's block.
+ * of the last whole window: all of them, or where the window is done in time every second, fourth ... alone, so that
+ * blocks of samples take alike. Below 4 ticks jets and channels are of one tick; with D = 1 every tick does all. All
+ * other ticks only add their samples to the front end's block.
  */
 #ifndef PVID_WEAK_TICKS_F32_H
 #define PVID_WEAK_TICKS_F32_H

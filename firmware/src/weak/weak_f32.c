@@ -12,6 +12,7 @@
 #include "number/finite_f32.h"
 #include "number/init.h"
 #include "number/unroll.h"
+#include "weak/steps.h"
 #include "weak/sums_f32.h"
 #include "weak/ticks_f32.h"
 #include "weak/valid_f32.h"
@@ -187,6 +188,12 @@ static pvid_status init_refinement(pvid_weak_f32 *self, const pvid_weak_refine_f
                                  self->trust.config.shared);
 }
 
+/* That add a block and join a window. */
+static uint32_t joining_ticks(const pvid_weak_f32 *self)
+{
+    return ((2u * (uint32_t)self->harmonics) + (self->items_per_tick - 1u)) / self->items_per_tick;
+}
+
 /* Returns whether the sums of a window have a place of their own, or are used before the next half's first block. */
 static bool window_has_place(const pvid_weak_f32 *self, uint32_t free_ticks)
 {
@@ -195,8 +202,7 @@ static bool window_has_place(const pvid_weak_f32 *self, uint32_t free_ticks)
     (void)free_ticks;
     return true;
 #else
-    const uint32_t adding = ((2u * (uint32_t)self->harmonics) + (self->items_per_tick - 1u)) / self->items_per_tick;
-    return pvid_weak_finish_columns_f32(self) <= (self->stages_per_tick * (free_ticks - adding));
+    return pvid_weak_finish_columns_f32(self) <= (self->stages_per_tick * (free_ticks - joining_ticks(self)));
 #endif
 }
 
@@ -252,11 +258,13 @@ PVID_COLD static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config
         return PVID_BAD_DESIGN;
     }
     self->items_per_tick = pvid_weak_items_f32(free_ticks, self->harmonics);
-    self->stages_per_tick =
-        pvid_weak_stages_f32(pvid_weak_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
+    const uint32_t stages = pvid_weak_finish_stages_f32(self);
+    self->stages_per_tick = pvid_weak_stages_f32(stages, design->hop, free_ticks, self->harmonics);
     if (self->stages_per_tick == 0u) {
         return PVID_BAD_ITERATIONS;
     }
+    self->pace = pvid_weak_pace(stages, pvid_weak_finish_columns_f32(self), design->hop / PVID_WEAK_BLOCK,
+                                PVID_WEAK_BLOCK, free_ticks / PVID_WEAK_BLOCK, joining_ticks(self));
     if (!window_has_place(self, free_ticks)) {
         return PVID_BAD_DESIGN;
     }
@@ -422,8 +430,12 @@ PVID_ALWAYS_INLINE pvid_reason run_tasks(pvid_weak_f32 *self, uint32_t ticks, pv
     if ((left > 0u) && (self->task == TASK_ADD)) {
         left = add_harmonics(self, left);
     }
-    return ((left > 0u) && (self->task == TASK_PROCESS)) ? process_window(self, left * self->stages_per_tick, reason)
-                                                         : reason;
+    if ((left == 0u) || (self->task != TASK_PROCESS)) {
+        return reason;
+    }
+    const uint32_t last = (self->front.wait > 0u) ? (self->front.wait - 1u) : 0u; /* 0: the step's last tick follows */
+    const uint32_t stages = (((last + left) >> self->pace) - (last >> self->pace)) * self->stages_per_tick;
+    return (stages > 0u) ? process_window(self, stages, reason) : reason;
 }
 
 /* That of a tick. */
@@ -486,7 +498,11 @@ static inline pvid_reason end_tick(pvid_weak_f32 *self, const float sample[])
     if (PVID_LIKELY(task < TASK_FORM)) {
         return (pvid_reason)task;
     }
-    return (task == TASK_PROCESS) ? process_window(self, self->stages_per_tick, idle(self)) : run_task(self);
+    if (task != TASK_PROCESS) {
+        return run_task(self);
+    }
+    return pvid_weak_rests(self->front.wait, self->pace) ? idle(self)
+                                                         : process_window(self, self->stages_per_tick, idle(self));
 }
 
 /* Of samples with one that is not finite or beyond its range: returns whether all are finite. */

@@ -11,6 +11,7 @@
 #include "number/integer_q31.h"
 #include "number/unroll.h"
 #include "weak/accumulator_q31.h"
+#include "weak/steps.h"
 #include "weak/valid_q31.h"
 #include "weak/weak_finish_q31.h"
 #include "weak/weak_front_q31.h"
@@ -136,6 +137,7 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     if ((self->stages_per_tick == 0u) || !window_fits(self)) {
         return PVID_BAD_ITERATIONS;
     }
+    self->pace = pvid_weak_pace_q31(design, stages, pvid_weak_finish_columns_q31(self));
     self->plain = self->accumulator.front.plain ? design->model->samples : 0u;
     choose_task(self);
     return PVID_OK;
@@ -260,11 +262,11 @@ static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
     return reason;
 }
 
-/* A tick that ends no step, with work. */
-PVID_NOINLINE static pvid_reason work(pvid_weak_q31 *self)
+/* A tick that ends no step, so many ticks before the end of one, with work. */
+PVID_NOINLINE static pvid_reason work(pvid_weak_q31 *self, uint32_t wait)
 {
     if (self->accumulator.sums.left == 0u) {
-        return advance_finish(self);
+        return pvid_weak_rests(wait, self->pace) ? idle_reason(self) : advance_finish(self);
     }
     const pvid_weak_tick tick = pvid_weak_accumulator_work_q31(&self->accumulator);
     return (self->accumulator.sums.left == 0u) ? after(self, tick) : idle_reason(self);
@@ -278,7 +280,7 @@ static inline pvid_reason end_tick(pvid_weak_q31 *self, const int32_t reading[])
         return after(self, end_step(self, reading));
     }
     const uint8_t task = self->task;
-    return (task == BUSY) ? work(self) : (pvid_reason)task;
+    return (task == BUSY) ? work(self, self->accumulator.front.wait) : (pvid_reason)task;
 }
 
 /* A tick whose readings need more than to be added. */
@@ -323,12 +325,13 @@ static uint32_t add_ticks(pvid_weak_q31 *self, const int32_t readings[], uint32_
     return added;
 }
 
-/* The work of so many ticks that end no step. Returns the reason of them and those before. */
-static pvid_reason run_tasks(pvid_weak_q31 *self, uint32_t ticks, pvid_reason before)
+/* The work of so many ticks that end no step, the last of them so many ticks before the end of one. Returns the reason
+ * of them and those before. */
+static pvid_reason run_tasks(pvid_weak_q31 *self, uint32_t ticks, uint32_t last, pvid_reason before)
 {
     pvid_reason reason = before;
     for (uint32_t left = ticks; (left > 0u) && (self->task == BUSY); left--) {
-        reason = pvid_outcome(reason, work(self));
+        reason = pvid_outcome(reason, work(self, (last + left) - 1u));
     }
     return reason;
 }
@@ -349,7 +352,7 @@ pvid_reason pvid_weak_step_block_q31(pvid_weak_q31 *self, const int32_t readings
         const bool ends = self->accumulator.front.wait == 0u;
         reading = &reading[added * width];
         left -= added;
-        reason = run_tasks(self, added - (ends ? 1u : 0u), reason);
+        reason = run_tasks(self, added - (ends ? 1u : 0u), ends ? 1u : self->accumulator.front.wait, reason);
         if (ends) {
             reason = pvid_outcome(reason, after(self, end_step(self, reading - width)));
         }

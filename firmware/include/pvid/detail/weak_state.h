@@ -216,6 +216,7 @@ struct pvid_weak_f32 {
     uint8_t iterations;
     uint8_t items_per_tick;  /* harmonics that a tick adds or joins */
     uint8_t stages_per_tick; /* stages of a whole window per tick */
+    uint8_t pace;            /* the `wait` of such a tick is a multiple of 2^pace */
     uint32_t ticks;          /* since the publication, less those of the windows in its age */
     float dt;                /* between steps [s] */
     pvid_weak_front_f32 front;

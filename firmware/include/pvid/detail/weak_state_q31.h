@@ -222,6 +222,7 @@ struct pvid_weak_q31 {
     uint8_t plain; /* samples, if each is a signal; else 0 */
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */
+    uint8_t pace;            /* the `wait` of such a tick is a multiple of 2^pace */
     bool warm;               /* a window has been complete since the restart */
     bool frozen;             /* complete windows are dropped */
     uint32_t ticks;          /* since the publication, less those of the windows in its age */
