@@ -4,6 +4,7 @@ import json
 import os
 import re
 import tarfile
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -87,6 +88,37 @@ def test_the_example_comes_near_the_truth(name: str, deployments: dict[str, Depl
 def test_cmake(name: str, deployments: dict[str, Deployment], tmp_path: Path) -> None:
     one = deployments[name]
     tree = built(written(one, "cmake", tmp_path / "p"), tmp_path / "b")
+    assert run(tree / f"{one.name}_example").splitlines() == expected(one)
+
+
+BLOCKS = """\
+    for (uint32_t tick = 0, count = 1; tick < @_EXAMPLE_TICKS; tick += count) {
+        static TYPE samples[25][@_SAMPLES];
+        static const uint32_t length[] = {24, 7, 1, 25};
+        count = 0;
+        while ((count < length[tick % 4]) && NAME_example_sample(tick + count, samples[count])) {
+            count++;
+        }
+        (void)NAME_step_block(samples[0], count);
+    }
+"""
+
+
+@pytest.mark.parametrize("name", ["dc_motor", "dc_motor in integers", "heated_plate in integers", "kapitza"])
+def test_its_blocks_have_the_estimate_of_its_steps(
+    name: str, deployments: dict[str, Deployment], pendulum: Deployment, tmp_path: Path
+) -> None:
+    """Of ragged lengths, in either arithmetic and with the second stage."""
+    one = pendulum if name == "kapitza" else deployments[name]
+    folder = written(one, "cmake", tmp_path / "p")
+    main = folder / "example" / "main.c"
+    blocks = BLOCKS.replace("TYPE", one.sample_type).replace("NAME", one.name).replace("@", one.upper)
+    text, changed = re.subn(
+        r"    for \(uint32_t tick = 0;.*?\n    \}\n", blocks, main.read_text("utf-8"), flags=re.DOTALL
+    )
+    assert changed == 1 and "_step(" not in text
+    main.write_text(text.replace(f"    {one.sample_type} sample[{one.upper}_SAMPLES];\n", ""), encoding="utf-8")
+    tree = built(folder, tmp_path / "b", "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror")
     assert run(tree / f"{one.name}_example").splitlines() == expected(one)
 
 
@@ -338,6 +370,21 @@ def test_a_readme_is_one_screen(target: str, motor: Deployment) -> None:
     lines = TARGETS[target](motor)["README.md"].splitlines()
     assert len(lines) <= 48
     assert all(f"    {line}" in lines for line in expected(motor))
+
+
+def test_the_command_takes_a_design_that_fits_into_the_ram(tmp_path: Path) -> None:
+    """The largest one: with a byte less there is another; of the fewest functions the bytes are told."""
+    command = ("deploy", "dc_motor", "--for", "cmake", "--core", "q31", "-o", "out", "--force", "--ram")
+    taken, notes = [10**6], []
+    for _ in range(3):
+        done = pvid(tmp_path, *command, str(taken[-1] - 1))
+        assert done.returncode == 0, done.stderr
+        notes.append("test functions in place of" in done.stderr)
+        readme = (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
+        taken.append(int(re.findall(r"takes about (\d+) bytes of RAM", readme)[0]))
+    assert notes == [False, True, True] and all(b < a for a, b in pairwise(taken))
+    refused = pvid(tmp_path, *command, "1000")
+    assert refused.returncode == 2 and "with the fewest test functions the first stage takes" in refused.stderr
 
 
 @pytest.mark.slow

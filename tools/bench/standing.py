@@ -27,7 +27,7 @@ CLEAN = ("mechanism", "publications", "doubted", "changes to doubted", "changes 
 ACCIDENTS = ("mechanism", "runs", "wrong, valid at the end", "not valid within a minute", "wrong, valid meanwhile")
 FAR = 5.0  # standard errors
 _SUBSTEPS = 20  # of a tick, midpoint rule
-_LATER = 4  # ticks behind a window's reason: its standing is known
+_LATER = 8  # ticks behind a window's reason: its standing is known, a stage later, at the slowest pace
 _BEFORE_S, _AFTER_S = 20.0, 60.0  # of an accident
 
 # What the motor has and the model has not: of a tick late, V, N*m*s^2, N*m, N*m, a share, a share.

@@ -37,6 +37,9 @@ _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "am
 @columns_option
 @click.option("--core", type=click.Choice(list(CORES)), default=_DEFAULT, show_default=True, help="Arithmetic.")
 @click.option("--functions", type=click.IntRange(4, 64), help="Test functions of the design.  [default: chosen]")
+@click.option(
+    "--ram", type=click.IntRange(1), help="Most RAM of the first stage [bytes]: fewer test functions if needed."
+)
 @force_option
 def command(
     model: str,
@@ -47,6 +50,7 @@ def command(
     columns: str | None,
     core: Core,
     functions: int | None,
+    ram: int | None,
 ) -> int:
     """Writes MODEL with the tables of a rig as an Arduino, PlatformIO, ESP-IDF, Zephyr, CMake or CubeMX package.
 
@@ -68,9 +72,10 @@ def command(
     given += [f"--columns {columns}"] if columns is not None else []
     given += [f"--core {core}"] if core != _DEFAULT else []
     given += [f"--functions {functions}"] if functions is not None else []
+    given += [f"--ram {ram}"] if ram is not None else []
     title = " ".join(["pvid deploy", Path(model).name, f"--for {target}", *given])
     is_integer = CORES[core] is FIXED
-    made = _deployment(model, rig_path, run_path, columns, is_integer, functions, title)
+    made = _within(ram, functions, _deployments(model, rig_path, run_path, columns, is_integer, title))
     paths = write_package(made, target, out)
     if made.playback.held is not None:
         seconds = len(made.playback.counts) / made.sample_rate
@@ -82,15 +87,41 @@ def command(
     return DONE
 
 
-def _deployment(
+def _within(ram: int | None, functions: int | None, made_with: Callable[[int | None], Deployment]) -> Deployment:
+    """The deployment, with the most test functions whose first stage takes so many bytes at most."""
+    from pvid.deploy.memory import state_bytes
+
+    chosen = made_with(functions)
+    size = None if ram is None else state_bytes(chosen)
+    if ram is None or (size is not None and size <= ram):
+        return chosen
+    if size is None:
+        raise PvidError("--ram needs a C compiler on this computer")
+    fits, least, most = None, 4, chosen.sizes["PVID_MAX_FUNCTIONS"] - 1
+    while least <= most:
+        middle = (least + most) // 2
+        tried = made_with(middle)
+        size = state_bytes(tried) or size
+        if size <= ram:
+            fits, least = tried, middle + 1
+        else:
+            most = middle - 1
+    if fits is None:
+        raise PvidError(f"--ram {ram}: with the fewest test functions the first stage takes {size} bytes")
+    number, before = (one.sizes["PVID_MAX_FUNCTIONS"] for one in (fits, chosen))
+    write_stderr(f"note: {number} test functions in place of {before}, for {ram} bytes: the standard errors grow")
+    return fits
+
+
+def _deployments(
     model: str,
     rig_path: Path | None,
     run_path: Path | None,
     columns: str | None,
     is_integer: bool,
-    functions: int | None,
     title: str,
-) -> Deployment:
+) -> Callable[[int | None], Deployment]:
+    """The deployment by its number of test functions; None: chosen."""
     from pvid.codegen.weak_sizes import refuse_too_many_unknowns
     from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
     from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
@@ -111,22 +142,30 @@ def _deployment(
         answer = None if run_path is None else analysis_of(compiled, recording)
         found = None if answer is None else answer.found
         warnings = () if answer is None else tuple(one.text for one in answer.doubts if one.alarm)
-        if is_integer:
-            weak = weak_q31_for_recording(compiled, recording, functions, found=found)
-            return replace(deployment_q31(weak, recording.signals, title), warnings=warnings)
         signs: Reversals = "averaged" if run_path is not None else "decided"
-        config = config_for_recording(compiled, recording, functions, reversals=signs, found=found)
-        refine = _noted(lambda: refine_design(compiled, config, recording.signals))
-        made = deployment_f32(compiled, config, recording.signals, title, refine, excitation)
-        return replace(made, warnings=warnings)
+
+        def of_recording(functions: int | None) -> Deployment:
+            if is_integer:
+                weak = weak_q31_for_recording(compiled, recording, functions, found=found)
+                return replace(deployment_q31(weak, recording.signals, title), warnings=warnings)
+            config = config_for_recording(compiled, recording, functions, reversals=signs, found=found)
+            refine = _noted(lambda: refine_design(compiled, config, recording.signals))
+            made = deployment_f32(compiled, config, recording.signals, title, refine, excitation)
+            return replace(made, warnings=warnings)
+
+        return of_recording
     if model not in names_of_shipped():
         raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
     run = simulated_run_of(compiled)[0]
-    if is_integer:
-        return deployment_q31(weak_q31_for_rig_like_the_shipped(compiled, functions), run, title)
-    config = config_for_rig_like_the_shipped(compiled, functions)
-    refine = _noted(lambda: refine_for_simulated_rig(compiled, config))
-    return deployment_f32(compiled, config, full_motion_of(compiled), title, refine)
+
+    def of_shipped_rig(functions: int | None) -> Deployment:
+        if is_integer:
+            return deployment_q31(weak_q31_for_rig_like_the_shipped(compiled, functions), run, title)
+        config = config_for_rig_like_the_shipped(compiled, functions)
+        refine = _noted(lambda: refine_for_simulated_rig(compiled, config))
+        return deployment_f32(compiled, config, full_motion_of(compiled), title, refine)
+
+    return of_shipped_rig
 
 
 def _excitation(compiled: CompiledModel, rig: MechanismRig, is_integer: bool) -> Excitation:
