@@ -142,6 +142,34 @@ def test_of_two_terms_that_are_missing_each_is_named_with_its_size() -> None:
         assert sizes == pytest.approx({("q", 1): 4.0, ("1", 2): 0.3}, rel=0.1)
 
 
+@pytest.mark.parametrize("joint", [1, 2, 3])
+def test_a_torque_with_another_gain_than_the_others_is_an_alarm(joint: int) -> None:
+    log = robot_arms.log_of(SPATIAL, 0)
+    log[f"tau{joint}"] *= 1.3
+    found = answer_of_robot(Recording(log.pop("t"), log, RATE), model_of(SPATIAL))
+    told = " ".join(one.text for one in found.verdict.reasons if one.alarm)
+    size = re.search(rf"torque of joint {joint} has [^;]*, a gain about (\d+)% above those of the others: one of", told)
+    if joint == 2:  # the one that carries most looks like a spring of it
+        assert (
+            "joint 2 has what the equations lack, -1.3" in told and "one of a spring, a cable and a wrong gear" in told
+        )
+    else:
+        assert size is not None and 15 < float(size[1]) < 35  # to first order: 30 and 21
+
+
+def test_a_spring_that_looks_like_gravity_is_one_of_what_differs_from_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within 0.5 rad: without the file nothing shows it."""
+    whole = robot_arms.motion
+    monkeypatch.setattr(
+        robot_arms, "motion", lambda *how: tuple(s * x for s, x in zip((1, 0.3, 0.3, 0.3), whole(*how), strict=True))
+    )
+    text = "one of another body, a spring, a cable and a counterweight, as of "
+    found = _with(0, (2, 4.0, "q"))
+    size = re.search(text + r"([\d.]+) N\*m/rad at joint 2", " ".join(one.text for one in found.verdict.reasons))
+    assert size is not None and float(size[1]) == pytest.approx(4.0, rel=0.2) and found.verdict.word == "usable"
+    assert text not in " ".join(one.text for one in _with(0).verdict.reasons)
+
+
 def test_what_is_missing_is_no_payload_and_a_payload_is_not_negative() -> None:
     found = payload_of(_with(3, *TWO), _with(4, *TWO))["m"]
     assert found.value is not None and found.se is not None

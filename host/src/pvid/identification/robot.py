@@ -19,7 +19,7 @@ from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.chain import INERTIAL, WRENCH
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.missing import student
-from pvid.oracle.weak.robot import Lacking, RobotFit, RobotRun, identify_robot, terms_of
+from pvid.oracle.weak.robot import GAIN, Lacking, RobotFit, RobotRun, identify_robot, terms_of
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 
@@ -29,16 +29,24 @@ _STILL = 0.14  # of the samples: 13 bits, 500 Hz, 0.8 rad/s; of 10 runs each 89 
 _CHANCE = 0.002  # of a clean recording: that one of all terms is taken for missing, by Student's t
 _APART = 2 / 3  # degrees of freedom of a window that overlaps half of the next
 _WORDS = {
-    "q": "{size} * q{joint}: a spring, a cable, or a wrong gear",
-    "1": "{size} at all times: an offset of its sensor, or a load",
+    "q": "{size} * q{joint}: one of a spring, a cable and a wrong gear",
+    "1": "{size} at all times: one of an offset of its sensor, a load, and a spring of which gravity's parameters take "
+    "the rest",
     "abs(v)*v": "{size} * abs(v)*v of its rate v: drag",
     "slow": "{size} at low speed: friction that is not dry plus viscous; move faster",
     "v": "{size} * its rate: drag",
+    GAIN: "a gain about {size} those of the others: one of its torque constant, its gear and its unit",
 }
 _UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2", "slow": "", "v": "*s/{unit}"}
 _SEEN = 1e-6  # relative size of a direction that the torques depend on
 _CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
 _PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+_OF_FILE = 0.1  # relative error of a file's values
+_FAR, _ALIKE = (
+    25.0,
+    2.0,
+)  # of squared differences from the file, over their errors: what a spring explains; what is left
+# of each value
 _EXPLAINED = 0.9  # R^2 of a torque below which the equations do not explain it,
 _NOISY = 1.5  # where the residual is larger than what the noise of the encoders makes of the torque
 
@@ -104,13 +112,20 @@ class RobotAnswer(Answer):
             reasons.append(Reason("sensor", text))
         values = [self.values[name] for name in names]
         sd = np.array([math.hypot(it.se_noise or math.inf, it.se_scale or 0.0) for it in values])
+        springs = self._springs
         for one in sure(fit):
             moved = [k for k in np.argsort(-np.abs(one.shift) / sd) if abs(one.shift[k]) > sd[k]]
+            if one.law == GAIN and (springs or not moved):
+                continue  # within what the gains' own errors are, or of a wrong gravity
             slides = chain.joints[one.joint].prismatic
-            unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")
             number = chain.number(one.joint)
-            size = _WORDS[one.law].format(size=with_unit(one.size, unit, 3), joint=number)
-            text = f"the {chain.force(one.joint)} has what the equations lack, {size}"
+            if one.law == GAIN:
+                size = f"{abs(one.size):.0%} {'above' if one.size > 0 else 'below'}"
+            else:
+                unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")
+                size = with_unit(one.size, unit, 3)
+            of = _WORDS[one.law].format(size=size, joint=number)
+            text = f"the {chain.force(one.joint)} has what the equations lack, {of}"
             if moved:
                 k = moved[0]
                 text += f"; with that {names[k]} would be {fit.p[k] + one.shift[k]:.4g} in place of {fit.p[k]:.4g}"
@@ -122,6 +137,7 @@ class RobotAnswer(Answer):
                     of=tuple(names[k] for k in moved),
                 )
             )
+        reasons += springs
         weak = [one.name for one in self.prediction if one.r2 < _EXPLAINED]
         if weak:  # the rates' noise may be all that is not explained
             pieces = zip(fit.predicted(fit.run, fit.p[np.newaxis]), fit.predicted(fit.run, fit.p[np.newaxis], 0),
@@ -138,6 +154,33 @@ class RobotAnswer(Answer):
             )
             reasons.append(Reason("unpredicted", text))
         return Verdict(tuple(reasons))
+
+    @property
+    def _springs(self) -> list[Reason]:
+        """A joint whose spring alone would make the values differ from the file's as they do."""
+        chain, names, fit = self.fit.run.chain, self.model.p_names, self.fit
+        file = np.array([np.nan if one is None else one for one in map(chain.of_file, chain.base)])
+        known = np.isfinite(file) & ~fit.undetermined
+        known &= [chain.standard[one.standard].kind in INERTIAL for one in chain.base]
+        weight = known / (np.diag(fit.covariance) + (_OF_FILE * np.where(known, file, 1.0)) ** 2)
+        off = np.where(known, fit.p - file, 0.0)
+        found = []
+        for joint, moved in enumerate(fit.springs):
+            if not (size := np.sum(weight * moved**2)):
+                continue
+            stiffness = float(np.sum(weight * moved * off) / size)
+            rest = np.sum(weight * (off - stiffness * moved) ** 2)
+            if np.sum(weight * off**2) > _FAR + rest and rest < _ALIKE * np.sum(known):
+                k = int(np.argmax(weight * (stiffness * moved) ** 2))
+                unit = "N/m" if chain.joints[joint].prismatic else "N*m/rad"
+                where = f"as of {with_unit(stiffness, unit, 3)} at joint {chain.number(joint)}"
+                text = (
+                    f"{names[k]} is {fit.p[k]:.4g}, and {file[k]:.4g} in the file: one of another body, a spring, a "
+                    f"cable and a counterweight, {where}, which this motion does not distinguish: move that joint "
+                    "farther"
+                )
+                found.append(Reason("missing", text, alarm=True, of=(names[k],)))
+        return found
 
     @cached_property
     def possible(self) -> tuple[Float, tuple[int, ...], Bodies | None]:
@@ -221,7 +264,8 @@ class RobotAnswer(Answer):
 
 def sure(fit: RobotFit) -> tuple[Lacking, ...]:
     """The terms that are missing, with the sizes that they have together."""
-    limit = student(_APART * fit.windows, _CHANCE / 2 / len(terms_of(fit.run.chain)))
+    terms = [law for law, _ in terms_of(fit.run.chain) if law != GAIN]  # a gain is to be twice as sure
+    limit = student(_APART * fit.windows, _CHANCE / 2 / len(terms))
     found: tuple[Lacking, ...] = ()
     for together in fit.lacking:
         if together[-1].t <= limit:

@@ -48,6 +48,7 @@ _CLEAR_RATE = 3.0  # of the noise of a rate, likewise
 _REACHED = 1e-6  # of the energy of a direction: what slow steps have of it
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
 _MOST_BYTES = 4e9  # of the rows, with what is computed from them
+_HIDDEN = 0.9  # of the energy of a spring's torque
 _TERMS = 3  # that may be missing; as many as joints, if these are more
 ALIKE = 2.0  # times as sure: friction that is soft where that of another joint is
 _DIRECTION = 1e-6  # relative size of a direction that is one
@@ -66,13 +67,15 @@ LAWS: Mapping[str, Callable[[Float, Float], Float]] = {  # of positions and rate
     "slow": _slow,
     "v": lambda q, v: v,
 }
+GAIN = "gain"  # of a recorded torque, in a robot of several: a law whose column is the predicted torque
 _OF_FREE = ("1", "abs(v)*v", "v")  # of the joints of a free base; the others have friction
 
 
 def terms_of(chain: Chain) -> list[tuple[str, int]]:
     """(law, joint) of what a robot may have beyond its equations."""
     joints = range(len(chain.joints))
-    return [(law, k) for law in LAWS for k in joints if ((law in _OF_FREE) if k < chain.free else law != "v")]
+    terms = [(law, k) for law in LAWS for k in joints if ((law in _OF_FREE) if k < chain.free else law != "v")]
+    return terms + [(GAIN, k) for k in joints if k >= chain.free and len(joints) > 1]
 
 
 def shortest_run(sample_rate: float) -> float:
@@ -369,10 +372,10 @@ class Lacking:
 
     Attributes
     ----------
-    law, joint : name in LAWS, and the joint from 0
+    law, joint : name in LAWS, or GAIN, and the joint from 0
     size : of the term [N m or N over the unit of the law]
     t : the size over its standard error when it was added, from the scatter of the windows, at least that of the rows;
-        of soft friction that another joint has too, ALIKE times that
+        of soft friction that another joint has too, ALIKE times that, and of a gain 1 / ALIKE times
     shift : what p moves by with the term [p]
     """
 
@@ -400,6 +403,8 @@ class RobotFit:
         [p]
     windows : of the run
     lacking : terms that the equations may lack, one, two, .. together: each time the surest is added, as the last one
+    springs : what a spring of 1 N m/rad or N/m at each joint moves p by [n, p]; 0 where p takes too little of it to
+        hide it
     """
 
     run: RobotRun
@@ -413,6 +418,7 @@ class RobotFit:
     undetermined: npt.NDArray[np.bool_]
     windows: int
     lacking: tuple[tuple[Lacking, ...], ...]
+    springs: Float
 
     @property
     def design(self) -> RobotDesign:
@@ -520,8 +526,17 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     apart = np.abs(halves[0] - halves[1]) / np.sqrt(np.sum(variances, axis=0))
     return RobotFit(
         whole, columns, p, covariance, by_gain, uncorrected, np.array(halves), apart, undetermined, rows.windows,
-        tuple(_lacking(white, p, bread, terms_of(whole.chain))),
+        tuple(_lacking(white, p, bread, terms_of(whole.chain))), _springs(white, bread),
     )  # fmt: skip
+
+
+def _springs(white: RobotRows, bread: Float) -> Float:
+    """See RobotFit."""
+    columns = white.others[list(LAWS).index("q")]
+    sides = np.einsum("iwpk,iwk->ip", white.regressors, columns, optimize=True)
+    moved = sides @ bread
+    taken = np.sum(sides * moved, axis=1) / np.sum(columns**2, axis=(1, 2))
+    return np.asarray(np.where(taken[:, np.newaxis] > _HIDDEN, moved, 0.0))
 
 
 def _lacking(white: RobotRows, p: Float, bread: Float, terms: list[tuple[str, int]]) -> Iterator[tuple[Lacking, ...]]:
@@ -533,7 +548,8 @@ def _lacking(white: RobotRows, p: Float, bread: Float, terms: list[tuple[str, in
     terms : as `terms_of`
     """
     e = white.residuals(p)
-    columns = np.array([white.others[list(LAWS).index(law), joint] for law, joint in terms])
+    columns = np.array([white.known[joint] - e[joint] if law == GAIN else white.others[list(LAWS).index(law), joint]
+                        for law, joint in terms])  # fmt: skip
     mixed = np.array([bread @ np.einsum("wpk,wk->p", white.regressors[joint], column)
                       for (_, joint), column in zip(terms, columns, strict=True)])  # fmt: skip
     rests = -np.einsum("iwpk,tp->tiwk", white.regressors, mixed, optimize=True)
@@ -560,7 +576,8 @@ def _lacking(white: RobotRows, p: Float, bread: Float, terms: list[tuple[str, in
             twice = 2 * float(np.sum((scores[:-1] * scores[1:])[white.next]))
             t = float(sizes[-1]) * left / math.sqrt(max(np.sum(scores**2) + max(twice, 0.0), left))
             alike = terms[k][0] == "slow" and any(terms[one][0] == "slow" for one in chosen)
-            best = max(best, (abs(t) * (ALIKE if alike else 1.0), int(k)))
+            surer = ALIKE if alike else 1 / ALIKE if terms[k][0] == GAIN else 1.0
+            best = max(best, (abs(t) * surer, int(k)))
         if best[1] < 0:
             return
         chosen.append(best[1])
