@@ -72,7 +72,7 @@ def assert_same(record: RefinedRecord, twin: PrintedTwin, samples: npt.NDArray[n
 
 
 @pytest.mark.parametrize(
-    ("options", "ticks"), [(("dry_friction", "slant"), 7000), pytest.param(("slant",), 10_000, marks=pytest.mark.long)]
+    ("options", "ticks"), [(("dry_friction", "slant"), 7600), pytest.param(("slant",), 10_000, marks=pytest.mark.long)]
 )
 def test_the_twin_has_the_bits_of_the_pendulum_with_options(options: tuple[str, ...], ticks: int) -> None:
     """Dry friction of hidden angles, a skew and derived inputs, with steps of Runge-Kutta."""
