@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import pvid
-from bench.lacking import recording
 from bench.mechanisms import design_of, start_of
-from bench.plants import PLANTS
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.identify import identify
 from pvid.rig.mechanism_file import MechanismRig
@@ -43,18 +41,6 @@ def test_declared_gain_is_part_of_the_standard_errors_and_needs_no_note() -> Non
     np.testing.assert_allclose((declared.se / declared.p)[positive], 0.01, rtol=0.05)
     texts = [next(reason.text for reason in one.verdict.reasons if reason.name == "scale") for one in (plain, declared)]
     assert "F (1 % of" in texts[0] and "F (" not in texts[1]
-
-
-def test_ratio_of_two_gains_that_the_run_shows_is_no_error() -> None:
-    """Heat flows by the difference of two temperatures: what is left is their common gain, 0.5 %/sqrt(2)."""
-    plates = PLANTS["plates"]
-    model = plates.model()
-    own = tuple(replace(one, gain_sd=0.005 if one.kind == "sensor" else 0.0) for one in model.signals)
-    found = identify(replace(model, signals=own, clock_sd=0.0), recording(plates, 1), plates.rate)
-    scale = np.sqrt(np.sum(found.gains**2, axis=0)) / found.p
-    apart = 0.005 * np.hypot(found.by_gain["Ta"], found.by_gain["Tb"]) / found.p
-    np.testing.assert_allclose(scale, 0.005 / np.sqrt(2), rtol=0.01)
-    assert apart[found.names.index("G")] > 4 * scale[found.names.index("G")]
 
 
 @pytest.mark.parametrize("name", ["dc_motor", "battery_2rc", "rigid_body"])

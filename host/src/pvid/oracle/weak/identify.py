@@ -253,8 +253,7 @@ def _judged(
         if one.gain_sd > 0 or one.unit != "rad"
     }
     by_clock = or_nan(fit, lambda: library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
-    causes = shared.of_scale(library)
-    causes = attempt("gains that the run shows", lambda: shared.as_shown(library, causes)) or causes
+    causes = tuple(shared.of_scale(library))
     parts = [
         verdict.widened(found.se, halves),
         *(one.moves for one in causes),
@@ -317,7 +316,7 @@ def _judged(
         allowance=units,
         by_gain=by_gain,
         by_clock=by_clock,
-        causes=tuple(causes),
+        causes=causes,
         by_model=by_model,
         lacking=lacking,
         named=named,

@@ -130,13 +130,13 @@ class Scores:
         )
         return np.asarray(np.sqrt((FOLDS - 1) * np.mean((without - without.mean(axis=0)) ** 2, axis=0)))
 
-    def rests(self, candidates: Sequence[Candidate], unit: bool = True) -> Float:
-        """Columns beside all parameters, if wanted of length 1 [candidates, windows * rows of all kinds]."""
+    def rests(self, candidates: Sequence[Candidate]) -> Float:
+        """Columns beside all parameters, of length 1 [candidates, windows * rows of all kinds]."""
         n = self.slopes.shape[-1]
         c = self.white(candidates).transpose(1, 0, 2).reshape(len(candidates), -1)
         slopes = self.slopes.reshape(-1, n)
         rest = c - (c @ slopes) @ self.inverse.T @ slopes.T
-        return np.asarray(rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300) if unit else rest)
+        return np.asarray(rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300))
 
     def by_noise(self, one: Candidate, noise: Change, noise_in: Change) -> float:
         """Part of what a term seems to explain that it does because it has the noise of the residuals in it.

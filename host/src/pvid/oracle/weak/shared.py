@@ -20,7 +20,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.rows import WeakRows, ready
 from pvid.oracle.weak.solve import Fit, compensated, gauss_newton
-from pvid.oracle.weak.terms import DELAY, GAIN, OFFSET
+from pvid.oracle.weak.terms import DELAY, OFFSET
 from pvid.oracle.weak.zero import on_their_own_scale
 
 _STEPS_OF_KNOWN = 10
@@ -36,12 +36,10 @@ class Cause:
     ----------
     text : what it is
     moves : what p is off by for one standard deviation of it [n_p]
-    gain : the signal whose gain it is; None: it is no gain
     """
 
     text: str
     moves: Float
-    gain: Signal | None = None
 
 
 def of_scale(library: Library) -> list[Cause]:
@@ -50,41 +48,11 @@ def of_scale(library: Library) -> list[Cause]:
     out = [_cause(fit, one.name, one.sd, partial(_by_known, library, one)) for one in model.knowns if one.sd]
     for one in model.signals:
         if one.gain_sd:
-            cause = _cause(fit, f"gain of {one.name}", one.gain_sd, partial(library.by_gain, one.name))
-            out.append(replace(cause, gain=one))
+            out.append(_cause(fit, f"gain of {one.name}", one.gain_sd, partial(library.by_gain, one.name)))
     if model.clock_sd:
         out.append(_cause(fit, "sample rate", model.clock_sd, lambda: library.by_clock))
     part = neglected(model, run)
     return [*out, Cause("neglected terms", ready(model).parameters.positive * fit.p * part)]
-
-
-def as_shown(library: Library, causes: list[Cause]) -> list[Cause]:
-    """The same on a recording that shows some of the gains: where a spring compares two motions, their ratio.
-
-    With standard deviations D of the gains, their columns C beside all parameters, and variance i of the residuals, the
-    gains' covariance is (D^-2 + C C^T / i)^-1 in place of D^2. Its symmetric root leaves to each cause its own part.
-    """
-    places = [k for k, one in enumerate(causes) if one.gain is not None and np.isfinite(one.moves).all()]
-    signals = [gain for k in places if (gain := causes[k].gain)]
-    if not signals:
-        return causes
-    scored = [library.scores.of([library.act(library.recorded(one.name), GAIN, 0.0)])[0] for one in signals]
-    columns = library.scores.rests(scored, unit=False)
-    information = columns @ columns.T
-    # What the windows' scatter or a gain that seems to be another make of an error that the columns alone would have.
-    larger = [1.0] + [
-        (1 + 1 / one.certainty**2) * one.size**2 * own
-        for one, own in zip(scored, np.diag(information), strict=True)
-        if one.certainty
-    ]
-    sd = np.array([one.gain_sd for one in signals])
-    shown = np.outer(sd, sd) * information / max(larger)
-    values, vectors = np.linalg.eigh(shown)
-    root = (vectors / np.sqrt(1 + np.maximum(values, 0.0))) @ vectors.T
-    out = list(causes)
-    for k, moves in zip(places, root @ np.array([causes[k].moves for k in places]), strict=True):
-        out[k] = replace(causes[k], moves=moves)
-    return out
 
 
 def of_signals(library: Library) -> Iterator[Cause]:
