@@ -28,7 +28,8 @@ static const pvid_weak_noise_f32 noisy[2] = {{0, 0, 1, 1, (float)(NOISE * NOISE 
 
 /* The mechanism: exact for an input that is held. */
 static first_order rig;
-static double gain; /* of u, 3 in truth */
+static double gain;     /* of u, 3 in truth */
+static float noisiness; /* of the sensor: NOISE, as declared */
 
 static void apply(float u)
 {
@@ -78,6 +79,7 @@ static void set_up(void)
                                             .restrained_max = 0.25f};
     config = all;
     gain = truth[0];
+    noisiness = NOISE;
     memset(&rig, 0, sizeof rig);
     rig.generator = 7u;
 }
@@ -86,8 +88,8 @@ static float largest;
 
 static pvid_commission_state tick(void)
 {
-    float drive[1] = {9.0f};
-    const float sample[2] = {9.0f, (float)rig.x + (NOISE * noise_of(&rig))};
+    float drive[2] = {9.0f, 0.0f};
+    const float sample[2] = {9.0f, (float)rig.x + (noisiness * noise_of(&rig))};
     const pvid_commission_state state = pvid_commission_step_f32(&self, sample, drive);
     assert_true(fabsf(drive[0]) <= 2.0f);
     largest = fmaxf(largest, fabsf(sample[1]));
@@ -226,6 +228,71 @@ static void another_mechanism_in_the_second_burst_does_not_fit(void **state)
     assert_int_equal(result->parameter, 0);
 }
 
+static void a_sensor_that_is_noisier_than_declared_does_not_fit(void **state)
+{
+    set_up();
+    noisiness = 4.0f * NOISE;
+    const pvid_commission_result_f32 *result = run(3);
+    assert_int_equal(result->verdict, PVID_COMMISSION_DOES_NOT_FIT);
+    assert_true(result->misfit[0] > config.misfit_max);
+    assert_true(result->misfit[1] == 0.0f); /* no second burst */
+}
+
+static void assert_refused_as(pvid_status status)
+{
+    assert_int_equal(pvid_commission_init_f32(&self, &config), status);
+    assert_false(pvid_commission_start_f32(&self));
+    float drive[2];
+    const float sample[2] = {0.0f, 0.0f};
+    assert_int_equal(pvid_commission_step_f32(&self, sample, drive), PVID_COMMISSION_IDLE);
+    assert_false(pvid_commission_work_f32(&self));
+}
+
+/* A second drive, in no sample; it does not move the mechanism. */
+static pvid_excite_config_f32 both[2];
+static pvid_excite_f32 two[2];
+static uint8_t places[2];
+static pvid_excite_guard_f32 of_second;
+
+static void set_up_two(void)
+{
+    set_up();
+    both[0] = excite;
+    both[1] = excite;
+    of_second = guard;
+    both[1].guard = &of_second;
+    places[0] = 0u;
+    places[1] = PVID_COMMISSION_NOWHERE;
+    config.excite = both;
+    config.excitation = two;
+    config.input = places;
+    config.drives = 2u;
+}
+
+static void a_second_drive_may_be_in_no_sample(void **state)
+{
+    set_up_two();
+    assert_done(run(3));
+    set_up_two();
+    of_second.soft_high = 0.29f; /* the second drive's own limit, which the first one's motion exceeds */
+    of_second.high = 0.3f;
+    of_second.push = 0.0f;
+    const pvid_commission_result_f32 *result = run(3);
+    assert_int_equal(result->verdict, PVID_COMMISSION_ABORTED);
+    assert_int_equal(result->reason, PVID_EXCITE_HARD_LIMIT);
+    assert_int_equal(result->drive, 1);
+    set_up_two();
+    both[1].ramp_s = 0.6f;
+    assert_refused_as(PVID_BAD_COMMISSION_DRIVES);
+    both[1].ramp_s = 0.5f;
+    both[1].slew = NAN;
+    assert_refused_as(PVID_BAD_EXCITE_SLEW);
+    both[1].slew = 400.0f;
+    both[0].slew = NAN; /* the first to be refused */
+    both[1].low = NAN;
+    assert_refused_as(PVID_BAD_EXCITE_SLEW);
+}
+
 static void it_is_aborted_in_every_state(void **state)
 {
     for (int at = 0; at < 40; at++) {
@@ -262,6 +329,14 @@ static void a_sensor_that_fails_aborts(void **state)
     }
     assert_int_equal(pvid_commission_result_of_f32(&self)->verdict, PVID_COMMISSION_ABORTED);
     assert_int_equal(pvid_commission_result_of_f32(&self)->reason, PVID_EXCITE_SENSOR);
+    assert_true(pvid_commission_start_f32(&self));
+    for (int k = 0; k < 1000; k++) {
+        (void)tick();
+    }
+    assert_int_equal(pvid_commission_step_f32(&self, bad, NULL), PVID_COMMISSION_IDLE); /* nowhere to write drives */
+    while (pvid_commission_step_f32(&self, NULL, drive) != PVID_COMMISSION_ENDED) {
+    }
+    assert_int_equal(pvid_commission_result_of_f32(&self)->reason, PVID_EXCITE_SENSOR);
 }
 
 static void without_a_drive_it_identifies_what_moves_by_itself(void **state)
@@ -286,12 +361,7 @@ static void without_a_drive_it_identifies_what_moves_by_itself(void **state)
 
 static void assert_refused(pvid_status status)
 {
-    assert_int_equal(pvid_commission_init_f32(&self, &config), status);
-    assert_false(pvid_commission_start_f32(&self));
-    float drive[1];
-    const float sample[2] = {0.0f, 0.0f};
-    assert_int_equal(pvid_commission_step_f32(&self, sample, drive), PVID_COMMISSION_IDLE);
-    assert_false(pvid_commission_work_f32(&self));
+    assert_refused_as(status);
     set_up();
 }
 
@@ -326,14 +396,35 @@ static void every_bad_field_is_refused_by_name(void **state)
     assert_refused(PVID_BAD_EXCITE_SLEW);
     weak.iterations = 0u;
     assert_refused(PVID_BAD_ITERATIONS);
-    config.ring = NULL;
-    assert_refused(PVID_BAD_POINTER);
-    config.weak = NULL;
-    assert_refused(PVID_BAD_POINTER);
+    const void *const no_pointer = NULL;
+    const size_t pointers[6] = {
+        offsetof(pvid_commission_config_f32, weak),   offsetof(pvid_commission_config_f32, identifier),
+        offsetof(pvid_commission_config_f32, excite), offsetof(pvid_commission_config_f32, excitation),
+        offsetof(pvid_commission_config_f32, input),  offsetof(pvid_commission_config_f32, ring)};
+    for (int i = 0; i < 6; i++) {
+        memcpy((char *)&config + pointers[i], &no_pointer, sizeof no_pointer);
+        assert_refused(PVID_BAD_POINTER);
+    }
+    uint32_t *const lengths[2] = {&config.ring_ticks, &config.burst_ticks};
+    config.passes = 1u;
+    for (int i = 0; i < 2; i++) {
+        *lengths[i] = 1u;
+        assert_refused(PVID_BAD_COMMISSION_RING);
+        excite.burst_s = 1.0e5f;
+        *lengths[i] = 16777217u;
+        assert_refused(PVID_BAD_COMMISSION_RING);
+    }
+    const uint8_t outside[1] = {2u};
+    config.input = outside;
+    assert_refused(PVID_BAD_COMMISSION_DRIVES);
     assert_int_equal(pvid_commission_init_f32(NULL, &config), PVID_BAD_POINTER);
     assert_int_equal(pvid_commission_init_layout_f32(&self, &config, PVID_LAYOUT + 1u), PVID_BAD_LAYOUT);
     assert_int_equal(pvid_commission_state_of_f32(NULL), PVID_COMMISSION_IDLE);
     assert_null(pvid_commission_result_of_f32(NULL));
+    float drive[1];
+    assert_int_equal(pvid_commission_step_f32(NULL, drive, drive), PVID_COMMISSION_IDLE);
+    assert_false(pvid_commission_work_f32(NULL));
+    assert_false(pvid_commission_start_f32(NULL));
     pvid_commission_abort_f32(NULL);
 }
 
@@ -345,6 +436,8 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test(within_too_tight_limits_it_blames_them),
     cmocka_unit_test(soft_limits_hold_the_motion_and_hard_ones_abort),
     cmocka_unit_test(another_mechanism_in_the_second_burst_does_not_fit),
+    cmocka_unit_test(a_sensor_that_is_noisier_than_declared_does_not_fit),
+    cmocka_unit_test(a_second_drive_may_be_in_no_sample),
     cmocka_unit_test(it_is_aborted_in_every_state),
     cmocka_unit_test(a_sensor_that_fails_aborts),
     cmocka_unit_test(without_a_drive_it_identifies_what_moves_by_itself),

@@ -436,8 +436,47 @@ static void every_bad_field_is_refused_by_name(void **state)
     assert_refused(&config, PVID_BAD_EXCITE_PARTS);
     config = plain(NULL);
     assert_refused(&config, PVID_BAD_EXCITE_PARTS);
+    pvid_excite_part_f32 part = sine;
+    config = plain(&part);
+    part.kind = (pvid_excite_kind)(PVID_EXCITE_STEPS + 1);
+    assert_refused(&config, PVID_BAD_EXCITE_PARTS);
+    const float level = 1.0f;
+    part.kind = PVID_EXCITE_STEPS;
+    part.levels = 1u;
+    assert_refused(&config, PVID_BAD_EXCITE_PARTS); /* no table */
+    part.level = &level;
+    part.levels = 0u;
+    assert_refused(&config, PVID_BAD_EXCITE_PARTS); /* an empty one */
+    config = plain(&sine);
+    config.low = 0.0f;
+    config.high = 0.0f; /* no range */
+    assert_refused(&config, PVID_BAD_EXCITE_LIMIT);
+    config = plain(&sine);
+    config.sample_rate_hz = 1.0e6f;
+    config.burst_s = 3000.0f; /* 3e9 ticks */
+    config.slew = 1.0e6f;
+    assert_refused(&config, PVID_BAD_EXCITE_TIME);
     config = plain(&sine);
     config.guards = 1u;
+    assert_refused(&config, PVID_BAD_EXCITE_GUARD); /* no table */
+    const pvid_excite_guard_f32 fits = {1u, false, -1.0f, -0.8f, 0.8f, 1.0f, 1.0f, 1.0f, 0.1f, 1.0f, 0.1f};
+    pvid_excite_guard_f32 guard[PVID_EXCITE_GUARDS + 1];
+    config.guard = guard;
+    const pvid_excite_guard_f32 wrong[5] = {
+        {2u, false, -1.0f, -0.8f, 0.8f, 1.0f, 1.0f, 1.0f, 0.1f, 1.0f, 0.1f}, /* no such signal */
+        {1u, true, -1.0f, -0.8f, 0.8f, 1.0f, 1.0f, 1.0f, 0.1f, 0.0f, 0.1f},  /* a rate is not looked ahead of */
+        {1u, true, -1.0f, -0.8f, 0.8f, 1.0f, 1.0f, 1.0f, 0.0f, 1.0f, 0.1f},  /* nor braked */
+        {1u, false, -1.0f, -0.8f, 0.8f, 1.0f, 0.5f, 1.0f, 0.1f, 1.0f, 0.1f}, /* no sign */
+        {1u, false, -1.0f, -0.8f, 0.8f, 1.0f, 0.0f, 1.0f, 0.1f, 1.0f, 0.1f}, /* a push to an unknown side */
+    };
+    for (int i = 0; i < 5; i++) {
+        guard[0] = wrong[i];
+        assert_refused(&config, PVID_BAD_EXCITE_GUARD);
+    }
+    for (size_t i = 0; i <= PVID_EXCITE_GUARDS; i++) {
+        guard[i] = fits;
+    }
+    config.guards = PVID_EXCITE_GUARDS + 1u;
     assert_refused(&config, PVID_BAD_EXCITE_GUARD);
     config = plain(&sine);
     config.slew = 1.0e-4f; /* of 5 in a tick: below what a float takes from it */
@@ -446,6 +485,11 @@ static void every_bad_field_is_refused_by_name(void **state)
     assert_int_equal(pvid_excite_init_f32(&self, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_excite_state_of_f32(NULL), PVID_EXCITE_IDLE);
     assert_true(pvid_excite_restrained_f32(NULL) == 0.0f);
+    uint8_t at = 9u;
+    assert_int_equal(pvid_excite_reason_of_f32(NULL, &at), PVID_EXCITE_FINISHED);
+    assert_int_equal(at, 0);
+    assert_false(pvid_excite_start_f32(NULL, 1.0f, 0u));
+    assert_true(pvid_excite_step_f32(NULL, NULL) == 0.0f);
     pvid_excite_stop_f32(NULL);
     pvid_excite_abort_f32(NULL);
 }
@@ -472,6 +516,8 @@ static void a_table_by_rule_keeps_its_amplitude(void **state)
     assert_int_equal(pvid_excite_rule_f32(NULL, 1.0f, 1.0f, 2.0f), 0);
     assert_int_equal(pvid_excite_rule_f32(part, NAN, 1.0f, 2.0f), 0);
     assert_int_equal(pvid_excite_rule_f32(part, 1.0f, 2.0f, 1.0f), 0);
+    assert_int_equal(pvid_excite_rule_f32(part, 1.0f, 0.0f, 1.0f), 0);
+    assert_int_equal(pvid_excite_rule_f32(part, 1.0e30f, 1.0f, 2.0f), 0);
 }
 
 static const struct CMUnitTest tests[] = {
