@@ -111,7 +111,22 @@ class Result:
     _columns: str | None = None
 
     def __getitem__(self, name: str) -> Parameter:
+        """Raises KeyError with the reason where the run does not determine this parameter."""
+        if name not in self.parameters:
+            raise KeyError(self._why_without(name))
         return self.parameters[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.parameters
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parameters)
+
+    def _why_without(self, name: str) -> str:
+        known: Mapping[str, Any] = self.details.get("parameters", {})
+        if name not in known:
+            return f"{name} is no parameter of this answer; it has {', '.join(known) or 'none'}"
+        return f"the run does not determine {name}: {known[name].get('reason') or self.status}"
 
     def __str__(self) -> str:
         head = f"nothing identified: {self.status}"

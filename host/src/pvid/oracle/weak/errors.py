@@ -10,6 +10,9 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.solve import RIDGE, Fit, inverse
 
+_NOISE_SHARE = 0.1  # of the information along a direction, below which its standard error is that of the whole
+_CHANCE = 3.0  # standard deviations of that share
+
 
 @dataclass(frozen=True)
 class Uncertainty:
@@ -49,9 +52,10 @@ def uncertainty(fit: Fit) -> Uncertainty:
     s_inverse = inverse(information, fit.tangent)
     covariance = covariance_of(information, neighbours, fit.tangent)
     drifted = fit.rows.compiled.bare.drifted
-    more = np.zeros_like(covariance) if drifted is None else drifted.excess_of(fit.parameters.names)
-    free = sum(one.free for one in fit.white) - fit.parameters.free(fit.p)
-    weighted = sum(float(np.sum(e**2)) for e in residuals) / max(free, 1)
+    more = without_motion(fit, designs)
+    if drifted is not None:
+        more = more + drifted.excess_of(fit.parameters.names)
+    weighted = _chi2(fit, residuals)
     predicted = unit * np.sqrt(np.diag(covariance) * max(1.0, weighted))
     scores = sum((np.einsum("wkp,wk->wp", d, e) for d, e in zip(designs, residuals, strict=True)))
     clustered = unit * np.sqrt(clustered_variance(np.asarray(scores), s_inverse))
@@ -65,6 +69,14 @@ def uncertainty(fit: Fit) -> Uncertainty:
         covariance * np.outer(unit, unit) + more,
         explained(fit),
     )
+
+
+def _free(fit: Fit) -> int:
+    return max(sum(one.free for one in fit.white) - fit.parameters.free(fit.p), 1)
+
+
+def _chi2(fit: Fit, residuals: list[Float]) -> float:
+    return sum(float(np.sum(e**2)) for e in residuals) / _free(fit)
 
 
 def covariance_of(information: Float, neighbours: Float, tangent: Float | None = None) -> Float:
@@ -95,10 +107,7 @@ def moments_of(fit: Fit, designs: list[Float]) -> tuple[Float, Float]:
     ----------
     designs : of `fit`
     """
-    information = np.diag(fit.parameters.prior(fit.start))
-    for d in designs:
-        own = flat(d.transpose(0, 2, 1))
-        information = information + own @ own.T
+    information = np.diag(fit.parameters.prior(fit.start)) + _of_rows(designs)
     neighbours = np.zeros_like(information)
     theta = fit.parameters.theta(fit.p)
     adjacent = np.flatnonzero(np.diff(fit.rows.numbers) == 1)
@@ -111,6 +120,68 @@ def moments_of(fit: Fit, designs: list[Float]) -> tuple[Float, Float]:
         in_doubt = np.einsum("er,enr->en", directions[entries], back[windows])
         neighbours += fit.rows.reversals.shared(entries, in_doubt)
     return information, neighbours
+
+
+def _of_rows(designs: list[Float]) -> Float:
+    """Information of the rows [n_p, n_p]."""
+    return np.asarray(sum(own @ own.T for own in (flat(d.transpose(0, 2, 1)) for d in designs)))
+
+
+def _of_noise(fit: Fit) -> Float:
+    """The part of that which the sensors' noise in the regressors makes, E[dN R^-1 dN^T] [n_p, n_p]."""
+    jacobian, k = fit.parameters.jacobian(fit.p), fit.rows.functions.count
+    out = np.zeros((len(fit.p), len(fit.p)))
+    for one in fit.white:
+        total = one.whitener.total_inverse()
+        for i, a in enumerate(one.kinds):
+            for j, b in enumerate(one.kinds):
+                of_columns = fit.rows.noise.within(a, b, total[i * k : (i + 1) * k, j * k : (j + 1) * k])
+                left, right = jacobian[a], jacobian[b]
+                out += left.T @ of_columns[: len(left), : len(right)] @ right
+    return out
+
+
+def _spread_of_noise(fit: Fit, step: Float) -> float:
+    """Relative standard deviation of the information that noise makes along a step [n_p]: few rows may have most."""
+    jacobian, total, squares = fit.parameters.jacobian(fit.p), 0.0, 0.0
+    for one in fit.white:
+        thetas = {kind: jacobian[kind] @ step for kind in one.kinds}
+        rows = [[fit.rows.noise.covariance(a, thetas[a], b, thetas[b], 0.0) for b in one.kinds] for a in one.kinds]
+        own = one.whitener.base @ np.block(rows) @ one.whitener.base.T
+        total += fit.rows.windows * float(np.trace(own))
+        squares += fit.rows.windows * float(np.sum(own**2))
+    return float(np.sqrt(2 * 2 * squares)) / max(total, 1e-300)  # neighbours have half their samples in common
+
+
+def without_motion(fit: Fit, designs: list[Float]) -> Float:
+    """What the covariance of p lacks, because noise in the regressors looks like motion [n_p, n_p], in units of p.
+
+    With v^T S v = 1 and S_n v = lambda S v, S the information of the rows and S_n its part of the noise, the scores,
+    which are compensated for noise, move p by 1 / (1 - lambda) of what S^-1 gives along v. Where 1 - lambda is within
+    chance, nothing moves along v, and p may be anywhere on that line: its deviation there takes one parameter as far as
+    its size. Parts below `_NOISE_SHARE` are left as they are.
+
+    Parameters
+    ----------
+    designs : of `fit`
+    """
+    parameters, unit = fit.parameters, fit.parameters.unit(fit.p)
+    basis = np.diag(1 / unit) if fit.tangent is None else fit.tangent
+    s, of_noise = (basis.T @ one @ basis for one in (_of_rows(designs), _of_noise(fit)))
+    scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
+    root = np.linalg.cholesky(s * np.outer(scale, scale) + RIDGE * np.eye(len(s)))
+    half = np.linalg.solve(root, np.linalg.solve(root, of_noise * np.outer(scale, scale)).T)
+    share, turned = np.linalg.eigh((half + half.T) / 2)
+    better = _chi2(fit, fit.residuals()) * (1 + _CHANCE * np.sqrt(2 / _free(fit)))  # sensors than declared
+    share *= min(1.0, better)
+    there = share >= _NOISE_SHARE
+    steps = (basis * scale) @ np.linalg.solve(root.T, turned[:, there])
+    v, rest = unit[:, np.newaxis] * steps, 1 - share[there]
+    size = np.maximum(np.abs(fit.p), np.where(parameters.positive, parameters.guess, parameters.sd))
+    reach = np.min(size[:, np.newaxis] / np.maximum(np.abs(v), 1e-300), axis=0)
+    by_chance = [_CHANCE * _spread_of_noise(fit, step) for step in steps.T]
+    grown = np.where(rest < by_chance, np.maximum(reach, 1.0), 1 / np.maximum(rest, 1e-300))
+    return np.asarray((v * (grown**2 - 1)) @ v.T)
 
 
 def inflation(fit: Fit) -> float:

@@ -137,9 +137,9 @@ class NoiseModel:
         """One more than the highest order."""
         return 1 + max((int(np.max(one.orders)) for one in self._sensors), default=0)
 
-    def _of_orders(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+    def _of_orders(self, a: int, theta_a: Float, b: int, theta_b: Float, of_y: float = -1.0) -> Float:
         """Weights P of the pairs of orders of two kinds [orders, orders]."""
-        left, right = np.append(theta_a, -1.0), np.append(theta_b, -1.0)
+        left, right = np.append(theta_a, of_y), np.append(theta_b, of_y)
         out = np.zeros(self._orders**2)
         for one in self._pairs_of(a, b):
             weights = left[one.first][:, np.newaxis] * one.products * right[one.second]
@@ -174,24 +174,30 @@ class NoiseModel:
                         out[(m + n) // 2, one.columns[i], one.columns[j]] += sign * one.products[i, j]
         return out
 
-    def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
-        """R0 [K, K] of two row kinds in one window."""
+    def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float, of_y: float = -1.0) -> Float:
+        """R0 [K, K] of two row kinds in one window; with of_y 0, of what a change of their thetas adds to the rows."""
         with np.errstate(over="ignore", invalid="ignore"):  # an iteration that runs away is judged by its residuals
-            return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._grams)
+            return np.tensordot(self._of_orders(a, theta_a, b, theta_b, of_y), self._grams)
 
     def with_next(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
         """R1 [K, K]: of the rows of a kind with those of another in the next window."""
         return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._overlaps)
 
-    def pull(self, a: int, b: int, theta_b: Float, weight: Float) -> Float:
-        """1/2 tr(weight dR0/d theta) with the thetas of kind a; weight [K, K] stands at the rows of a and b."""
-        right = np.append(theta_b, -1.0)
-        out = np.zeros(self._columns)
-        traces = np.einsum("mnkl,kl->mn", self._grams, weight, optimize=True)
+    def within(self, a: int, b: int, weight: Float) -> Float:
+        """tr(weight E[n_i n_j^T]) of the noises n_i in each column of kind a and n_j in each of kind b
+        [columns, columns]; weight [K, K] stands at the rows of a and b."""
+        out = np.zeros(self._columns**2)
+        traces = np.einsum("mnkl,kl->mn", self._grams, weight, optimize=True).reshape(-1)
         for one in self._pairs_of(a, b):
-            shares = one.products * right[one.second] * traces.reshape(-1)[one.places].reshape(one.products.shape)
-            out += np.bincount(one.first, shares.sum(axis=1), self._columns)
-        return out
+            shares = one.products.reshape(-1) * traces[one.places]
+            places = one.first[:, np.newaxis] * self._columns + one.second
+            out += np.bincount(places.reshape(-1), shares, len(out))
+        return out.reshape(self._columns, self._columns)
+
+    def pull(self, a: int, b: int, theta_b: Float, weight: Float) -> Float:
+        """1/2 tr(weight dR0/d theta) with the thetas of kind a; weight as of `within`."""
+        right = np.append(theta_b, -1.0)
+        return np.asarray(self.within(a, b, weight)[:, : len(right)] @ right)
 
     @cached_property
     def _grams(self) -> Float:

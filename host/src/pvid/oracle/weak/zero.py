@@ -14,7 +14,7 @@ from statistics import NormalDist
 import numpy as np
 import numpy.typing as npt
 
-from pvid.oracle.weak.errors import covariance_of, moments_of
+from pvid.oracle.weak.errors import covariance_of, moments_of, without_motion
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.rows import Compiled, WeakRows
@@ -51,9 +51,11 @@ def near_zero(fit: Fit, se: Float) -> tuple[Bool, Float]:
     if not doubtful.any():
         return none, se
     own = on_own_scale(fit, doubtful)
-    information, neighbours = moments_of(own, own.designs())
+    designs = own.designs()
+    information, neighbours = moments_of(own, designs)
     covariance = covariance_of(information, neighbours, own.tangent)
-    own_se = own.parameters.unit(own.p) * np.sqrt(np.diag(covariance))
+    variance = own.parameters.unit(own.p) ** 2 * np.diag(covariance) + np.diag(without_motion(own, designs))
+    own_se = np.sqrt(variance)
     small = doubtful & (own_se <= _OF_GUESS * parameters.guess) & (fit.p * UNKNOWN <= own_se)
     return small, np.where(small, own_se, se)
 

@@ -1,0 +1,63 @@
+"""One tone determines a combination of mass and stiffness, and not each: what noise in the regressors looks like."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+import pvid
+from pvid.model import Model
+
+TRUTH = {"m": 1.0, "k": 50.0, "c": 1.0}
+RATE, SD = 500.0, 1e-4
+
+
+@cache
+def cart() -> Model:
+    model = Model("cart")
+    force = model.input("F", "N", hold="zoh")
+    x = model.sensor("x", "m", noise=SD)
+    m, k, c = (
+        model.unknown(name, unit, 1.5 * TRUTH[name]) for name, unit in zip("mkc", ("kg", "N/m", "N*s/m"), strict=True)
+    )
+    model.equation(m * x.d(2) + c * x.d() + k * x - force)
+    return model
+
+
+def recorded(seed: int, of_resonance: float, second: float, until: float = 40.0) -> dict[str, np.ndarray]:
+    """10 s after the transient of a held force: a tone, and until then [s] a second one of so many newtons."""
+    m, k, c = TRUTH.values()
+    t = np.arange(int(40 * RATE)) / RATE
+    rate = of_resonance * np.sqrt(k / m)
+    force = np.sin(rate * t) + second * np.sin(2.3 * rate * t) * (t < until)
+    b, a, _ = cont2discrete(([1.0], [m, c, k]), 1 / RATE)
+    noise = SD * np.random.default_rng(seed).standard_normal(len(t))
+    run = {"t": t, "F": force, "x": lfilter(b[0], a, force) + noise}
+    return {name: x[int(30 * RATE) :] for name, x in run.items()}
+
+
+@pytest.mark.parametrize("of_resonance", [0.7, 1.0, 1.5])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_one_tone_determines_the_damping_alone(seed: int, of_resonance: float) -> None:
+    result = pvid.identify(recorded(seed, of_resonance, 0.0), model=cart())
+    assert set(result.parameters) == {"c"}
+    assert abs(result["c"].value - TRUTH["c"]) < 3 * result["c"].se
+    with pytest.raises(KeyError, match="the run does not determine m: the standard error of m is"):
+        result["m"]
+    assert "m" not in result and list(result) == ["c"]
+    assert "does not determine" in str(result.warning) and "not identifiable together" in str(result.warning)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_second_tone_of_a_twentieth_determines_all(seed: int) -> None:
+    result = pvid.identify(recorded(seed, 1.0, 0.05), model=cart())
+    assert result.verdict == "good" and set(result.parameters) == set(TRUTH)
+    for name, one in result.parameters.items():
+        assert abs(one.value - TRUTH[name]) < 3 * one.se < 0.1 * TRUTH[name]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_half_of_the_run_with_one_tone_alone_does_not_contradict_the_other(seed: int) -> None:
+    result = pvid.identify(recorded(seed, 1.0, 0.3, until=35.0), model=cart())
+    assert result.verdict == "good" and result.warning is None
