@@ -127,8 +127,8 @@ def _of_rows(designs: list[Float]) -> Float:
     return np.asarray(sum(own @ own.T for own in (flat(d.transpose(0, 2, 1)) for d in designs)))
 
 
-def _of_noise(fit: Fit) -> Float:
-    """The part of that which the sensors' noise in the regressors makes, E[dN R^-1 dN^T] [n_p, n_p]."""
+def of_noise(fit: Fit) -> Float:
+    """The part of the information which the sensors' noise in the regressors makes, E[dN R^-1 dN^T] [n_p, n_p]."""
     jacobian, k = fit.parameters.jacobian(fit.p), fit.rows.functions.count
     out = np.zeros((len(fit.p), len(fit.p)))
     for one in fit.white:
@@ -167,10 +167,10 @@ def without_motion(fit: Fit, designs: list[Float]) -> Float:
     """
     parameters, unit = fit.parameters, fit.parameters.unit(fit.p)
     basis = np.diag(1 / unit) if fit.tangent is None else fit.tangent
-    s, of_noise = (basis.T @ one @ basis for one in (_of_rows(designs), _of_noise(fit)))
+    s, by_noise = (basis.T @ one @ basis for one in (_of_rows(designs), of_noise(fit)))
     scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
     root = np.linalg.cholesky(s * np.outer(scale, scale) + RIDGE * np.eye(len(s)))
-    half = np.linalg.solve(root, np.linalg.solve(root, of_noise * np.outer(scale, scale)).T)
+    half = np.linalg.solve(root, np.linalg.solve(root, by_noise * np.outer(scale, scale)).T)
     share, turned = np.linalg.eigh((half + half.T) / 2)
     better = _chi2(fit, fit.residuals()) * (1 + _CHANCE * np.sqrt(2 / _free(fit)))  # sensors than declared
     share *= min(1.0, better)

@@ -169,7 +169,9 @@ class Missing:
         """
         best: dict[tuple[str, str, str], Candidate] = {}
         tried = [one for one in self.there if one.share >= _TRIED * self.there[0].share]
-        for one in sorted(tried, key=lambda one: one.own <= _DISTINCT):  # of levels one that is no guise of p
+        # Of levels one that is no guise of p, and of those that explain the same, the one that is most of its own.
+        first = {id(one): (one.own <= _DISTINCT, -round(one.share / tried[0].share, 2), -one.own) for one in tried}
+        for one in sorted(tried, key=lambda one: first[id(one)]):
             best.setdefault(one.family, one)
         families = sorted(best.values(), key=lambda one: -one.share)
         if not families:

@@ -5,6 +5,9 @@ in p and S their information,
 
     rest = c - J S^-1 J^T c,    a = rest.r / rest.rest,    shift of p = -S^-1 J^T c a.
 
+Noise in J is taken off J^T J, and its bias off J^T r, as in the estimate: else a column that is free of noise would
+take over what the noise hides of the motion.
+
 What counts is the share of the residuals' energy that the term removes from windows that neither p nor a has seen.
 """
 
@@ -20,10 +23,10 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.oracle.weak import work
 from pvid.oracle.weak.channels import Record
-from pvid.oracle.weak.errors import clustered_variance
+from pvid.oracle.weak.errors import clustered_variance, of_noise
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import WhiteRows
-from pvid.oracle.weak.solve import Fit, inverse
+from pvid.oracle.weak.solve import Fit, inverse, pulls
 from pvid.oracle.weak.terms import Candidate, Change
 
 FOLDS = 4  # contiguous parts of each recording: p and sizes from three, the share on the fourth
@@ -33,6 +36,8 @@ _OWN, _OF_ONE = 1e-6, 1e-5
 
 # What replaces a signal as a whole has a column of size 1.
 _WHOLE = (0.4, 2.5)
+
+_MOST_NOISE = 0.9  # of the information along any direction, that is taken off
 
 _TOGETHER = 16  # candidates
 _OF_SCORE = 2e-5  # units of work for an entry of a column
@@ -72,7 +77,26 @@ class Scores:
         self.prior = np.diag(fit.parameters.prior(fit.start))
         self.unit = fit.parameters.unit(fit.p)
         self.tangent = fit.tangent
-        self.inverse = inverse(np.einsum("wkp,wkq->pq", self.slopes, self.slopes) + self.prior, self.tangent)
+        s = np.einsum("wkp,wkq->pq", self.slopes, self.slopes) + self.prior
+        self._noise, self._pull = self._of_noise(s)  # a window
+        self.inverse = inverse(s - len(self.slopes) * self._noise, self.tangent)
+        self._beside = inverse(s, self.tangent)
+
+    def _of_noise(self, s: Float) -> tuple[Float, Float]:
+        """Part of each window's slopes by slopes that is noise, and what its slopes by residuals lack for it; 0 of an
+        estimate without compensation."""
+        fit, none = self.fit, (np.zeros_like(s), np.zeros(len(s)))
+        jacobian = fit.parameters.jacobian(fit.p)
+        lacks = np.zeros(len(s))
+        for one, pull in zip(fit.white, pulls(fit.rows, fit.white, self.theta), strict=True):
+            lacks += np.concatenate([jacobian[kind] for kind in one.kinds]).T @ pull
+        gradient, own = np.einsum("wkp,wk->p", self.slopes, self.residuals), inverse(s, self.tangent)
+        if (gradient + lacks) @ own @ (gradient + lacks) > gradient @ own @ gradient:
+            return none
+        noise = of_noise(fit)
+        most = float(np.max(np.abs(np.linalg.eigvals(own @ noise)), initial=0.0))
+        part = min(1.0, _MOST_NOISE / most) if most > 0 else 0.0
+        return part * noise / len(self.slopes), part * lacks / len(self.slopes)
 
     def shift(self, one: Candidate) -> Float:
         """What p moves by when a term of size 1 is added [n_p]."""
@@ -135,7 +159,7 @@ class Scores:
         n = self.slopes.shape[-1]
         c = self.white(candidates).transpose(1, 0, 2).reshape(len(candidates), -1)
         slopes = self.slopes.reshape(-1, n)
-        rest = c - (c @ slopes) @ self.inverse.T @ slopes.T
+        rest = c - (c @ slopes) @ self._beside.T @ slopes.T
         return np.asarray(rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300))
 
     def by_noise(self, one: Candidate, noise: Change, noise_in: Change) -> float:
@@ -148,7 +172,7 @@ class Scores:
         c, its, r = (self.whitened(change(self.theta)) for change in (one.changed, noise_in, noise))
         mixed = np.einsum("wkp,wk->p", self.slopes, c) @ self.inverse
         of_noise = np.einsum("wkp,wk->p", self.slopes, its) @ self.inverse
-        explained = float(np.sum((c - self.slopes @ mixed) * self.residuals))
+        explained = float(np.sum(c * self.residuals) - self._of_parts[1].sum(axis=0) @ mixed)
         return float(np.sum((its - self.slopes @ of_noise) * r)) / explained if explained else 0.0
 
     def leaves(self, one: Candidate) -> float:
@@ -199,7 +223,7 @@ class Scores:
     def _of_windows(self) -> tuple[Float, Float]:
         """Of each window, slopes by slopes and slopes by residuals [windows, n_p, n_p], [windows, n_p]."""
         turned = self.slopes.transpose(0, 2, 1)
-        return turned @ self.slopes, (turned @ self.residuals[..., np.newaxis])[..., 0]
+        return turned @ self.slopes - self._noise, (turned @ self.residuals[..., np.newaxis])[..., 0] + self._pull
 
     @cached_property
     def _of_parts(self) -> tuple[Float, Float, Float]:

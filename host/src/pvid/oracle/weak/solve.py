@@ -345,27 +345,35 @@ def resumed(rows: WeakRows, fit: Fit, passes: int) -> Fit:
 
 
 def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) -> Moments:
-    """Moments with what noise in the regressors takes from B put back: 1/2 d log det R / d theta, of all windows.
+    """Moments with what noise in the regressors takes from B put back, of all windows.
 
     Without it a row with Y = 0 pulls its own scale towards 0 by one for each of its rows, since a smaller theta leaves
     smaller residuals at the weights of the theta before.
     """
     moments = Moments.of(white)
-    k = rows.functions.count
-    for place, one in enumerate(white):
+    for place, pull in enumerate(pulls(rows, white, theta)):
+        moments.b[place] += pull
+    return moments
+
+
+def pulls(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) -> list[Float]:
+    """1/2 d log det R / d theta of each group, of all windows [thetas of its kinds]."""
+    k, out = rows.functions.count, []
+    for one in white:
         total = one.whitener.total_inverse()
-        pulls = []
+        of_kinds = []
         for a, kind in enumerate(one.kinds):
             blocks = [total[a * k : (a + 1) * k, b * k : (b + 1) * k] for b in range(len(one.kinds))]
             own = [
                 rows.noise.pull(kind, other, theta[other], block)
                 for other, block in zip(one.kinds, blocks, strict=True)
             ]
-            pulls.append(np.sum(own, axis=0)[: len(theta[kind])])
-        moments.b[place] += np.concatenate(pulls)
+            of_kinds.append(np.sum(own, axis=0)[: len(theta[kind])])
+        pull = np.concatenate(of_kinds)
         if one.whitener.alike:
-            moments.b[place] += rows.reversals.slopes(one.kinds, *one.whitener.inverse_of_directions())
-    return moments
+            pull = pull + rows.reversals.slopes(one.kinds, *one.whitener.inverse_of_directions())
+        out.append(pull)
+    return out
 
 
 def differs(a: EquationError, b: EquationError) -> bool:
