@@ -107,9 +107,12 @@ def test_the_c_moves_as_the_table(motion: Motion, tmp_path: Path) -> None:
 
 
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
-    "speed": (lambda: simple_drives(model_of(speed=None), 5.0), "j0 has no limit of its speed"),
+    "speed": (lambda: simple_drives(model_of(speed=None), 5.0), "j0 and j1 have no limits of their speeds: model."),
     "noise": (lambda: simple_drives(model_of(torque=None), 5.0), "j0 has neither a limit nor a noise of its torque"),
-    "range": (lambda: simple_drives(model_of(limits=None, prismatic=True), 5.0), "j0 has no limits"),
+    "range": (
+        lambda: simple_drives(model_of(limits=None, prismatic=True), 5.0),
+        "j0 and j1 have no limits: model.joint",
+    ),
     "inertial": (lambda: simple_drives(model_of(inertial=None), 5.0), "a limit of a torque needs the inertias"),
     "weak": (lambda: simple_drives(model_of(torque=0.9), 5.0), "within its limits: j1 needs 111% of its torque"),
     "box": (lambda: simple_drives(model_of(box=((5, 5, 5), (6, 6, 6))), 5.0), "a point is outside the box"),

@@ -13,7 +13,7 @@ that of the series, of torques and points twice the largest second difference.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.model.chain import Chain, Joint, friction
 from pvid.model.compiled import CompiledModel
 from pvid.model.operations import differentiated, evaluated
@@ -150,7 +151,7 @@ class Task:
         if chain.free:
             raise PvidError("a motion is designed for robots on a fixed base, and this base is free")
         self.model, self.chain, self.series, self.n = model, chain, series, len(chain.joints)
-        self.low, self.high, self.speed = (np.array(one) for one in zip(*map(_reach, chain.joints), strict=True))
+        self.low, self.high, self.speed = _reach(chain.joints)
         self.columns = [one.standard for one in chain.base]
         self.program, self.entries = chain.program(self.columns)
         self.others = list(friction(chain, self.columns))
@@ -396,12 +397,23 @@ def _peak(sizes: Float, values: Float) -> Float:
     return np.asarray(sizes.max(axis=-1) + np.abs(np.diff(values, 2, axis=-1)).max(axis=-1, initial=0.0) / 4)
 
 
-def _reach(joint: Joint) -> tuple[float, float, float]:
-    if joint.speed is None:
-        raise PvidError(f"{joint.name} has no limit of its speed: model.joint({joint.name!r}, .., speed=1.5)")
-    if joint.limits is None and joint.prismatic:
-        raise PvidError(f"{joint.name} has no limits: model.joint({joint.name!r}, .., limits=(0, 0.5))")
-    return (*(joint.limits or (-math.pi, math.pi)), joint.speed)
+def _reach(joints: Sequence[Joint]) -> tuple[Float, Float, Float]:
+    """Least and largest position, and speed [joints]."""
+    fast = [one for one in joints if one.speed is None]
+    if fast:
+        raise PvidError(_without(fast, "limit of its speed", "limits of their speeds", "speed=1.5"))
+    far = [one for one in joints if one.limits is None and one.prismatic]
+    if far:
+        raise PvidError(_without(far, "limits", "limits", "limits=(0, 0.5)"))
+    reach = [(*(one.limits or (-math.pi, math.pi)), one.speed or 0.0) for one in joints]
+    low, high, speed = np.array(reach).T
+    return low, high, speed
+
+
+def _without(joints: Sequence[Joint], one: str, several: str, typed: str) -> str:
+    names = listed(joint.name for joint in joints)
+    lacking = f"{names} has no {one}" if len(joints) == 1 else f"{names} have no {several}"
+    return f"{lacking}: model.joint({joints[0].name!r}, .., {typed})"
 
 
 def simple_drives(model: CompiledModel, duration: float, rate: float = 1000.0) -> list[tuple[Task, Series]]:
