@@ -199,6 +199,9 @@ def test_identify_prints_what_the_core_finds() -> None:
         answer = answer_of_robot_in_c(Recording(recording.t[:size], short, recording.sample_rate), model)
         assert answer.identified == begun and not answer.prediction and "predicts" not in "".join(answer.lines)
         assert begun or "the core has no estimate" in answer.verdict.reasons[0].text
+    vast = {name: 1e8 * one if name.startswith("tau") else one for name, one in run.items()}
+    answer = answer_of_robot_in_c(Recording(recording.t, vast, recording.sample_rate), model)
+    assert not answer.identified and "of its rows are beyond its range: is a column" in answer.verdict.reasons[0].text
 
 
 def test_what_the_core_does_not_take_is_refused_in_a_sentence() -> None:

@@ -162,6 +162,16 @@ def test_tied_parameters_are_found_with_their_errors_in_float64_and_in_c() -> No
     assert p[2] != np.float32(0.05) and p[2] == pytest.approx(p[3], rel=1e-6)
 
 
+def test_what_constraints_fix_has_no_error_and_is_no_doubt() -> None:
+    """R through a constant, in both forms: its variance is 0, and its float32 another number than float64's."""
+    for answer in (
+        identify_in_c(analysed(recording(), motor("ke - kt", "R - 12*R0/10")), "f32"),
+        identify_strong_mechanism(recording(), motor("ke - kt", "R - 12*R0/10"), "f32"),
+    ):
+        assert all(np.isfinite([one.value or np.nan, one.se or 0.0]).all() for one in answer.values.values())
+        assert answer.values["R"].value == pytest.approx(1.2, rel=1e-6) and "disagree" not in str(answer.verdict)
+
+
 def test_the_refinement_keeps_constraints_with_their_errors() -> None:
     """Without it kt, J and b have no value; the redundant second one does no harm."""
     answer = identified(recording(), motor("ke - kt", "ke**2 - kt**2"), refine=True, predict=False)

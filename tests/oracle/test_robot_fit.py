@@ -14,7 +14,7 @@ from robot_models import model_of, truth_of
 
 from pvid.base.errors import PvidError
 from pvid.identification.robot import RobotAnswer, answer_of_robot, payload_of, sure
-from pvid.model.chain import Chain
+from pvid.model.chain import Chain, Joint, rotation_of
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.robot import LAWS, RobotFit, RobotRun, identify_robot
 from pvid.rig.run import Recording
@@ -168,6 +168,16 @@ def test_a_spring_that_looks_like_gravity_is_one_of_what_differs_from_the_file(m
     size = re.search(text + r"([\d.]+) N\*m/rad at joint 2", " ".join(one.text for one in found.verdict.reasons))
     assert size is not None and float(size[1]) == pytest.approx(4.0, rel=0.2) and found.verdict.word == "usable"
     assert text not in " ".join(one.text for one in _with(0).verdict.reasons)
+
+
+def test_a_centre_that_the_file_has_on_the_axis_is_no_spring() -> None:
+    """hy1 is 0 in the file and 0.02 kg m in truth: a tenth of hx1."""
+    upright, inertial = rotation_of((np.pi / 2, 0, 0)), (1.0, 0.2, 0.0, 0.0, 0.01, 0.0, 0.0, 0.01, 0.0, 0.05)
+    file = Chain((Joint("a", -1, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), upright, inertial=inertial),))
+    moved = (*inertial[:2], 0.02, *inertial[3:])
+    log = robot_arms.log_of(replace(file, joints=(replace(file.joints[0], inertial=moved),)), 0, viscous=0.05, dry=0.1)
+    found = answer_of_robot(Recording(log.pop("t"), log, RATE), model_of(file))
+    assert found.verdict.warning is None and found.values["hy1"].value == pytest.approx(0.02, rel=0.05)
 
 
 def test_what_is_missing_is_no_payload_and_a_payload_is_not_negative() -> None:

@@ -273,6 +273,42 @@ def test_table_is_found_whatever_stands_around_it(case: str, tmp_path: Path) -> 
     assert note in "; ".join(found.notes), found.notes
 
 
+ABOVE_TIMES = ["time,F,x", "Time (s),F,x", "t_ms,F,x", "Zeit,F,x", "ms,F,x", "n,F,x"]
+
+
+@pytest.mark.parametrize("names", ABOVE_TIMES)
+def test_a_stated_step_does_not_replace_a_column_that_may_be_the_time(names: str, tmp_path: Path) -> None:
+    """The nominal rate above real stamps, and a count of rows some of which were lost."""
+    with pytest.raises(PvidError, match="no column t"):
+        table(tmp_path, of("# fs = 1000 Hz", names, *PLAIN), None)
+
+
+@pytest.mark.parametrize("front", ["# solver dt = 0.001 s", "# Sample rate: 1000 Hz (ADC)", "# PWM period 20 ms"])
+def test_a_column_of_whole_seconds_is_no_count(front: str, tmp_path: Path) -> None:
+    rows = [f"{k},{f},{x}" for k, (_, f, x) in enumerate(CELLS)]
+    np.testing.assert_array_equal(table(tmp_path, of(front, "t,F,x", *rows)).t, range(len(rows)))
+
+
+NO_STEPS = [
+    *("Baud rate: 115200", "Feed rate: 5", "strain rate: 0.1 1/s", "PWM period: 50 us", "drive period = 2 s"),
+    *("Encoder increment: 0.0015", "Delta X: 5", "Ts = 0.4 s settling time of the loop", "Sample rate: 1,000 Hz"),
+    "Sample rate: 1 kHz, stored every 10th: dt = 0.01 s",
+]
+
+
+@pytest.mark.parametrize("front", NO_STEPS)
+def test_what_may_be_another_rate_is_no_step(front: str, tmp_path: Path) -> None:
+    with pytest.raises(PvidError, match="no column t"):
+        table(tmp_path, of(f"# {front}", "F,x", *BARE), None)
+
+
+@pytest.mark.parametrize("line", ["t={} ms F={},47 N x=0,0{}7 m", "({}; {},12; 0,1{})", "t={} F={} x=- 0.{}1"])
+def test_printed_decimal_commas_and_lone_signs_are_not_read_as_other_numbers(line: str, tmp_path: Path) -> None:
+    rows = [line.format(k, 1 + k % 3, k % 10) for k in range(40)]
+    with pytest.raises(PvidError):
+        table(tmp_path, of(*rows), "t=1,F=2,x=3" if line.startswith("(") else None)
+
+
 # ---- numbers
 
 MN = [(f"{round(t * 1000)}", round(f * 1000), round(x * 1e6)) for t, f, x in zip(T, F, X, strict=True)]

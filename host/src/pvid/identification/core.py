@@ -283,7 +283,8 @@ def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
     ends = record.reason[~np.isin(record.reason, _WITHIN)]
     model, found = answer.model, answer.found
     # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
-    wider = np.maximum(found.noise / np.sqrt(np.diag(run.covariance)), 1.0)
+    own = np.sqrt(np.diag(run.covariance))  # 0 of what constraints fix
+    wider = np.maximum(np.divide(found.noise, own, out=np.ones(len(own)), where=own > 0), 1.0)
     covariance = run.covariance * np.outer(wider, wider)
     # A core searches logarithms: of what may be 0 it stays uncertain, and publishes nothing.
     by_analysis = not published and any(one.status == "near_zero" for one in found.judged)

@@ -41,7 +41,8 @@ _UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2", "slow": "", "v":
 _SEEN = 1e-6  # relative size of a direction that the torques depend on
 _CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
 _PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-_OF_FILE = 0.1  # relative error of a file's values
+_OF_FILE = 0.1  # relative error of a file's values, which are taken as large as at least
+_OF_WHOLE = 0.5  # of the body's vector or tensor
 _FAR, _ALIKE = (
     25.0,
     2.0,
@@ -162,7 +163,12 @@ class RobotAnswer(Answer):
         file = np.array([np.nan if one is None else one for one in map(chain.of_file, chain.base)])
         known = np.isfinite(file) & ~fit.undetermined
         known &= [chain.standard[one.standard].kind in INERTIAL for one in chain.base]
-        weight = known / (np.diag(fit.covariance) + (_OF_FILE * np.where(known, file, 1.0)) ** 2)
+        # Of a centre on its axis the file has a 0: a part of the whole vector's length is known of each component.
+        groups = [(chain.standard[one.standard].joint, chain.standard[one.standard].unit) for one in chain.base]
+        whole = [np.sqrt(np.sum(file[[it and of == own for it, of in zip(known, groups, strict=True)]] ** 2))
+                 for own in groups]  # fmt: skip
+        length = np.maximum(np.abs(np.where(known, file, 1.0)), _OF_WHOLE * np.where(known, whole, 1.0))
+        weight = known / (np.diag(fit.covariance) + (_OF_FILE * length) ** 2)
         off = np.where(known, fit.p - file, 0.0)
         found = []
         for joint, moved in enumerate(fit.springs):

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.rounding import percent
+from pvid.base.wording import listed
 from pvid.codegen.files_robot import RobotFiles, refuse_in_c
 from pvid.codegen.robot_library import RobotNative
 from pvid.configuration.robot_core import robot_core_design
@@ -23,6 +25,10 @@ from pvid.settings.enums import Reason as CoreReason
 
 Float32 = npt.NDArray[np.float32]
 
+_CLASH = 4.0  # joint standard errors
+_MOST_REFUSED = 0.01
+_BEYOND = (CoreReason.REJECTED_SATURATED, CoreReason.REJECTED_NOT_FINITE)
+
 
 @dataclass(frozen=True, eq=False)
 class RobotCoreAnswer(RobotAnswer):
@@ -32,10 +38,14 @@ class RobotCoreAnswer(RobotAnswer):
     ----------
     number : of estimates that the core published
     halves_known : each half of the recording alone has an estimate
+    apart : base parameters of which the core and float64 are further apart than their standard errors explain
+    refused : part of the samples' ticks whose sample or row is beyond what float32 takes
     """
 
     number: int = 0
     halves_known: bool = False
+    apart: tuple[str, ...] = ()
+    refused: float = 0.0
 
     @property
     def identifier(self) -> str:
@@ -55,11 +65,23 @@ class RobotCoreAnswer(RobotAnswer):
     @cached_property
     def verdict(self) -> Verdict:
         """See RobotAnswer; not identified without an estimate."""
-        text = (
-            "the core has no estimate: some standard error is not below half of that of the start: record longer, and "
-            "move all joints"
-        )
-        return super().verdict if self.number else Verdict((Reason("not_identified", text),))
+        if not self.number:
+            text = (
+                f"the core has no estimate: {percent(self.refused)} of its rows are beyond its range: is a column "
+                "in another unit?"
+                if self.refused > _MOST_REFUSED
+                else "the core has no estimate: some standard error is not below half of that of the start: record "
+                "longer, and move all joints; or the angles are many turns from 0"
+            )
+            return Verdict((Reason("not_identified", text),))
+        reasons = super().verdict.reasons
+        if self.apart:
+            text = (
+                f"the C core and the float64 analysis disagree on {listed(self.apart)}: most of what determines them "
+                "may be noise of the encoders"
+            )
+            reasons = (*reasons, Reason("core", text, of=self.apart))
+        return Verdict(reasons)
 
     def as_json(self) -> dict[str, Any]:
         """See RobotAnswer."""
@@ -75,13 +97,13 @@ def answer_of_robot_in_c(recording: Recording, model: CompiledModel) -> RobotCor
     answer = answer_of_robot(recording, model)
     samples, design = samples_of_core(answer.fit.run, recording), robot_core_design(model, recording)
 
-    def last(own: Float32) -> tuple[RobotNative, int]:
+    def last(own: Float32) -> tuple[RobotNative, npt.NDArray[np.uint8]]:
         native = RobotNative(model, design)
-        reasons = native.run(own)[0]
-        found = np.flatnonzero(reasons == CoreReason.UPDATED)
-        return native, int(found[-1]) + 1 if len(found) else 0
+        return native, native.run(own)[0]
 
-    whole, end = last(samples)
+    whole, reasons = last(samples)
+    found = np.flatnonzero(reasons == CoreReason.UPDATED)
+    end = int(found[-1]) + 1 if len(found) else 0
     p, _, number = whole.read()
     halves = [last(one)[0].read() for one in np.array_split(samples, 2)]
     again = RobotNative(model, design)
@@ -95,8 +117,18 @@ def answer_of_robot_in_c(recording: Recording, model: CompiledModel) -> RobotCor
         halves=np.array([one[0] for one in halves], np.float64),
         undetermined=answer.fit.undetermined | (number == 0),
     )
+    known = ~(answer.fit.undetermined | fit.undetermined)
+    joint = np.sqrt(np.diag(answer.fit.covariance) + np.diag(fit.covariance))
+    apart = np.flatnonzero(known & (np.abs(answer.fit.p - fit.p) > _CLASH * joint))
     return RobotCoreAnswer(
-        model, fit, values_of(model, fit), recording, number=number, halves_known=all(one[2] for one in halves)
+        model,
+        fit,
+        values_of(model, fit),
+        recording,
+        number=number,
+        halves_known=all(one[2] for one in halves),
+        apart=tuple(model.p_names[k] for k in apart),
+        refused=float(np.isin(reasons, _BEYOND).mean()),
     )
 
 

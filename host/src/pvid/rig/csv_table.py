@@ -117,6 +117,8 @@ class _TextTable:
             raise PvidError(f"{path} has no line of two numbers or more: this is no table.")
         step = stated_step(lines[: layout.body - 1], layout)
         timeless = columns["t"].name == "t" and "t" not in layout.names and not (layout.labelled or layout.beside[0])
+        own = [one for one in layout.names if "=" not in one]  # no settings
+        timeless = timeless and not any(map(TIME.is_called, own)) and not _rising(lines, layout, columns)
         notes: tuple[str, ...] = ()
         if timeless and step is not None:
             self._blocks = partial(_numbered, blocks_of, layout)
@@ -129,7 +131,7 @@ class _TextTable:
             self._places = columns.places(path, layout.names, where)
         except MissingColumnError as missing:
             others = (columns[one].name in layout.names for one in columns.units if one != "t")
-            if not timeless or any(map(TIME.is_called, layout.names)) or not all(others):
+            if not timeless or not all(others):
                 raise
             hint = "; where rows have no time, a line in front such as '# dt = 0.001 s' states that between them."
             raise MissingColumnError(str(missing).removesuffix(".") + hint, missing.names) from None
@@ -147,7 +149,8 @@ class _TextTable:
             units.pop("t")
         is_time_unit = unit_in(columns["t"].name, "s") or scale_to("s", units.get("t", "") or "1")
         if step is not None and not (notes or columns["t"].unit_given or self._time_is_text or is_time_unit):
-            if _count_on([cells[self._places["t"]] for cells in body]):
+            clock = TIME.is_called(columns["t"].name) and not layout.beside[0]
+            if not clock and _count_on([cells[self._places["t"]] for cells in body]):
                 columns, notes = step.of(columns), (f"{columns['t'].name} counts rows: one each {step}",)
                 units.pop("t")
         self._columns, of_units = columns.in_units_of_file(units)
@@ -268,6 +271,18 @@ def _numbered(blocks_of: Callable[[], Iterator[bytes]], layout: Layout) -> Itera
             lines[k] = line + separator + (b"t" if line == head else str(rows).encode())
             rows += line != head
         yield b"\n".join(lines)
+
+
+def _rising(lines: Sequence[str], layout: Layout, columns: Columns) -> bool:
+    """Whether a column that nothing names rises from row to row: it may be the time under another name."""
+    used = {columns[one].name for one in columns.units}
+    rows = [cells for line in lines[layout.body - 1 :] if (cells := layout.cells(line)) and len(cells) == layout.width]
+    for place, name in enumerate(layout.names[: layout.width]):
+        own = [cells[place] for cells in rows]
+        if name not in used and len(own) > 2 and all(map(is_number, own)):
+            if all(b > a for a, b in pairwise(float(one.replace(",", ".")) for one in own)):
+                return True
+    return False
 
 
 def _count_on(cells: Sequence[str]) -> bool:

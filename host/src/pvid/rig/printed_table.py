@@ -23,6 +23,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|-?(?:nan|inf|null)(?![A-Za
 _TOKEN = re.compile(rf"(?<![A-Za-z_\d.^]){_TIME}|(?<![A-Za-z_\d.^])(?:{_NUMBER})", re.I)
 _LABEL = re.compile(r"([^\W\d][\w.]*)[\"']?\s*[:=]\s*[\"'(\[{\-\s]*$")
 _UNIT = re.compile(r"\s?([A-Za-zµμ°%Ω][\w/*^°µ²%]*)(?!\s*[:=\w])")
+_LONE_SIGN = re.compile(r"[=(\[,;]\s*-\s+$")
 _RECORD_ENDS = re.compile(rb"(?m)^---\s*$")
 _SECONDS, _PARTS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
 
@@ -46,6 +47,8 @@ def printed(blocks_of: Callable[[], Iterator[bytes]]) -> Printed | None:
     labels = [_LABEL.search(one) for one in usual[:-1]]
     names = [str(k + 1) if one is None else one[1] for k, one in enumerate(labels)]
     stamp = next(line for line, between in text if between == usual)
+    if any(one == "," or _LONE_SIGN.search(one) for one in _TOKEN.split(stamp)):
+        return None  # decimal commas; a sign apart from its number
     if labels[0] is None and re.match(_TIME, _TOKEN.findall(stamp)[0]):
         names[0] = "time" if "t" in names else "t"
     joined = next((k for k, (a, b) in enumerate(pairwise(names)) if a in _SECONDS and b in _PARTS), None)

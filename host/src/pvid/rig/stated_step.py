@@ -11,17 +11,26 @@ from pvid.base.units import scale_to
 from pvid.rig.columns import Column, Columns
 from pvid.rig.layout import Layout, split
 
-_SAMPLING = r"(?:sampl\w*|scan|logging|acquisition|data|abtast\w*)"
-_STATED = re.compile(
-    rf"""(?<![A-Za-z])
-    (?: (?P<rate> f_?s | (?:{_SAMPLING}[ _-]*)?rate | {_SAMPLING}[ _-]*freq\w* | abtastfrequenz)
-      | d[ _]?t | t_?s | [tx]_?incr?\w* | delta[ _]?(?:t|x|time) | increment | abtastzeit | messintervall
-      | (?:{_SAMPLING}|time|horizontal|measur\w*)?[ _-]*(?:interval|period|step|increment) | sampl\w*[ _-]*time )
+_SAMPLING = r"(?:sampl\w*|scan|logging|acquisition|abtast\w*)"
+_NUMBER = r"""
     \s* (?:[\[(](?P<bracket>[^\])]+)[\])] | in\s+(?P<word>[A-Za-zµ/]+))?
     "?\s*[:=,;\t ]["\s:=,;]*
-    (?P<number>\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) \s* (?P<unit>[A-Za-zµ/]*)""",
+    (?P<number>\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) \s* (?P<unit>[A-Za-zµ/]*)"""
+_STATED = re.compile(
+    rf"""(?<![A-Za-z])
+    (?: (?P<rate> f_?s | {_SAMPLING}[ _-]*(?:rate|freq\w*) | abtastfrequenz)
+      | d[ _]?t | [tx]_?incr?\w* | delta[ _]?(?:t|time) | delta_x | abtastzeit | messintervall
+      | {_SAMPLING}[ _-]*(?:interval|period|step|increment|time) ){_NUMBER}""",
     re.X | re.I,
 )
+# Words that may be of anything, at the beginning of a line, with a unit or beside the names.
+_BARE = re.compile(
+    rf"""^[\s#%;/*"]* (?: (?P<rate> (?:data[ _-]*)?rate)
+      | t_?s | delta[ ]x | increment | (?:(?:data|time|horizontal|measur\w*)[ _-]*)?(?:interval|period|step|increment)
+    ){_NUMBER} (?P<rest>.*)$""",
+    re.X | re.I,
+)
+_THOUSANDS = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 _RATE = re.compile(r"(?P<prefix>[kM]?)(?:Hz|Sa?/s|sps|samples/s(?:ec)?|1/s)?", re.I)
 _SAME = 1e-6
 
@@ -49,33 +58,40 @@ class Step:
 
 def stated_step(front: Sequence[str], layout: Layout) -> Step | None:
     """Of the lines in front of the first row; None where none states it, or two contradict each other."""
-    found = [
-        Step(seconds, number) for number, line in _statements(front, layout) if (seconds := _seconds(line, layout))
-    ]
-    agree = all(abs(one.seconds / found[0].seconds - 1) < _SAME for one in found)
+    found = [Step(seconds, number) for number, line, beside in _statements(front, layout)
+             for seconds in _seconds(line, layout, beside)]  # fmt: skip
+    agree = all(one.seconds > 0 and abs(one.seconds / found[0].seconds - 1) < _SAME for one in found)
     return found[0] if found and agree else None
 
 
-def _statements(front: Sequence[str], layout: Layout) -> Iterator[tuple[int, str]]:
+def _statements(front: Sequence[str], layout: Layout) -> Iterator[tuple[int, str, bool]]:
     """Lines with their numbers; settings beside the names have their numbers in the line below."""
     for number, line in enumerate(front, 1):
-        yield number, line
+        yield number, line, False
         if number == layout.header and number < len(front):
             below = (split(one, layout.separator) or [] for one in (line, front[number]))
-            yield from ((number + 1, f"{name}={cell}") for name, cell in zip(*below, strict=False))
+            yield from ((number + 1, f"{name}={cell}", True) for name, cell in zip(*below, strict=False))
 
 
-def _seconds(line: str, layout: Layout) -> float:
-    """That a line states; 0 of any other."""
-    match = _STATED.search(line)
-    if match is None:
-        return 0.0
-    text = match["number"].partition(",")[0] if layout.separator == "," else match["number"].replace(",", ".")
-    number, unit = float(text), match["unit"] or match["bracket"] or match["word"] or ""
-    if number <= 0:
-        return 0.0
-    if match["rate"]:
-        rate = _RATE.fullmatch(unit)
-        return 0.0 if rate is None else 1 / (number * {"": 1.0, "k": 1e3, "m": 1e6}[rate["prefix"].lower()])
-    scale = scale_to("s", unit or "s")
-    return 0.0 if scale is None else number * scale.factor / scale.divisor
+def _seconds(line: str, layout: Layout, beside: bool) -> Iterator[float]:
+    """Those that a line states; 0 where it may be one or another."""
+    matches = list(_STATED.finditer(line))
+    bare = None if matches else _BARE.match(line)
+    if (
+        bare is not None
+        and (beside or bare["unit"] or bare["bracket"] or bare["word"])
+        and not bare["rest"].strip('" ,;')
+    ):
+        matches = [bare]
+    for match in matches:
+        text = match["number"].partition(",")[0] if layout.separator == "," else match["number"].replace(",", ".")
+        number, unit = float(text), match["unit"] or match["bracket"] or match["word"] or ""
+        if number <= 0:
+            continue
+        is_rate = bool(match["rate"])
+        if _THOUSANDS.fullmatch(match["number"]) and (is_rate or "," in match["number"]):
+            yield 0.0
+        elif is_rate and (rate := _RATE.fullmatch(unit)) is not None:
+            yield 1 / (number * {"": 1.0, "k": 1e3, "m": 1e6}[rate["prefix"].lower()])
+        elif not is_rate and (scale := scale_to("s", unit or "s")) is not None:
+            yield number * scale.factor / scale.divisor

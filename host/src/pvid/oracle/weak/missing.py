@@ -139,7 +139,9 @@ class Missing:
         ]
         leads = [not doubtful or sureness(one) > (_DISTINCT / max(one.own, 1e-300)) ** 0.5 for one in possible]
         best = next((one.share for one, own in zip(possible, leads, strict=True) if own), np.inf)
-        there = tuple(one for one, own in zip(possible, leads, strict=True) if own or one.share > _RIVAL * best)
+        there = tuple(
+            one for one, own in zip(possible, leads, strict=True) if own or one.share > max(_RIVAL * best, _LARGE)
+        )
         plausible = [one for one in there if one.share >= _PLAUSIBLE * there[0].share]
         shifts = np.array(
             [one.shift for one in plausible if one.own > _DISTINCT or one.share > _RIVAL * there[0].share]

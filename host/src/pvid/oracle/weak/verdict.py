@@ -63,7 +63,7 @@ ParameterStatus = Literal["identified", "near_zero", "not_identified"]
 
 # Of another parameter: part of its range.
 _UNKNOWN_OF_RANGE = 0.5
-_COLLAPSED = 1e-6  # of its guess: a value that no mechanism has, whatever its error
+_COLLAPSED = 1e-6  # of its guess, or its inverse: a value that no mechanism has, whatever its error
 _NEXT_TO_0 = 1e-3  # of its guess: a value and an error of it that mean 0
 _TIED = 0.98  # correlation of two that are determined up to a common factor
 
@@ -210,7 +210,7 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
             out.append(
                 Judged("not_identified", f"{one.name} is at its bound, {side} = {with_unit(bound, one.unit, 4)}")
             )
-        elif not se[k] <= limit or one.positive and p < _COLLAPSED * one.guess and not own_scale:
+        elif not se[k] <= limit or one.positive and _is_lost(p / one.guess) and not own_scale:
             ran_down = one.positive and max(p, float(se[k])) < _NEXT_TO_0 * one.guess
             why = (
                 "the search takes {} to 0"
@@ -220,7 +220,8 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
             )
             if se[k] <= limit:
                 value = with_unit(p, one.unit, 2)
-                why = f"{{}} would be {value}, below a millionth of its guess: is that in another unit?"
+                far = "below a millionth of" if p < one.guess else "above a million times"
+                why = f"{{}} would be {value}, {far} its guess: is that in another unit?"
             has_error = not ran_down and bool(np.isfinite(se[k]))
             out.append(Judged("not_identified", why.format(one.name), has_error=has_error))
         elif own_scale and se[k] > UNKNOWN * abs(p):
@@ -231,6 +232,10 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
     if not any(known):  # all at 0: the equations do not describe the run
         return [replace(one, status="not_identified") for one in out]
     return _without_scale(model, fit, out)
+
+
+def _is_lost(of_guess: float) -> bool:
+    return not _COLLAPSED <= of_guess <= 1 / _COLLAPSED
 
 
 def _without_scale(model: CompiledModel, fit: Fit, found: Sequence[Judged]) -> list[Judged]:
