@@ -32,7 +32,7 @@ _WORDS = {
     "q": "{size} * q{joint}: one of a spring, a cable and a wrong gear",
     "1": "{size} at all times: one of an offset of its sensor, a load, and a spring of which gravity's parameters take "
     "the rest",
-    "abs(v)*v": "{size} * abs(v)*v of its rate v: drag",
+    "abs(v)*v": "{size} * abs(v)*v of its rate v: one of drag and another gain of that torque",
     "slow": "{size} at low speed: friction that is not dry plus viscous; move faster",
     "v": "{size} * its rate: drag",
     GAIN: "a gain about {size} those of the others: one of its torque constant, its gear and its unit",
@@ -43,11 +43,8 @@ _CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
 _PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _OF_FILE = 0.1  # relative error of a file's values, which are taken as large as at least
 _OF_WHOLE = 0.5  # of the body's vector or tensor
-_FAR, _ALIKE = (
-    25.0,
-    2.0,
-)  # of squared differences from the file, over their errors: what a spring explains; what is left
-# of each value
+_FAR = 25.0  # of squared differences from the file, over their errors: what a spring explains at least
+_ALIKE = 2.0  # of each value: what is left at most
 _EXPLAINED = 0.9  # R^2 of a torque below which the equations do not explain it,
 _NOISY = 1.5  # where the residual is larger than what the noise of the encoders makes of the torque
 
