@@ -12,6 +12,7 @@ import pytest
 from pvid.model import Model, sgn
 from pvid.model.compiled import CompiledModel
 from pvid.models.drive import RandomSteps
+from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import Identified, identify
 from pvid.oracle.weak.samples import clipped
@@ -82,6 +83,18 @@ def test_sensor_that_clips_is_named(limit: float, side: str) -> None:
     value = f"-{limit:g} A" if side == "smallest" else f"{limit:g} A"
     assert f"i stands at its {side if side != 'both' else 'largest'} value, {value}" in found["clipped"]
     assert not {"sensor", "missing", "friction"} & set(found)
+
+
+@pytest.mark.parametrize("rate", [500, 5000, 50000])
+@pytest.mark.parametrize("counts", [20, 80, 4000])
+def test_coarse_counts_at_the_turns_of_a_tone_are_no_limit(counts: int, rate: int) -> None:
+    """The resolution is not declared; a motion that ends three quarters of the way clips."""
+    model = compiled_of("mass_on_spring")
+    x, force = model.signal("x"), np.sin(6 * np.arange(5 * rate) / rate)
+    counted = np.round(counts * force + 0.2) / counts
+    sensor = replace(x, resolution=0.0)
+    assert not clipped(model, sensor, {"x": counted, "F": force})
+    assert clipped(model, sensor, {"x": np.minimum(counted, 0.75), "F": force})
 
 
 def test_record_of_a_drive_that_clips_is_noted_where_the_equations_do_not_explain_the_run() -> None:

@@ -27,7 +27,7 @@ _CLIPPED = 2e-3  # of the samples at the limit, from which a sensor clips
 _HELD = 3  # samples at the limit, at least
 _BEYOND = 10.0  # resolutions by which the motion before the limit would have gone beyond it
 _MOVES = 0.02  # of its range, by which another signal moves meanwhile
-_APPROACH = 3  # samples before the limit
+_APPROACH, _APART = 3, 4.0  # samples before the limit, at least, and resolutions from it
 
 _BLOCK = 50  # samples of a standstill
 _TOGGLES = 0.1  # of the samples of a block that differ from the one before
@@ -86,13 +86,17 @@ def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) 
     reach = float(np.nanmax(x) - np.nanmin(x))
     inertial = any(order_of(one, [signal.name]) > 1 for one in model.equations)
     others = [y for name, y in samples.items() if name != signal.name]
-    step = max(signal.resolution, 1e-6 * reach)
+    rises = np.abs(np.diff(x))
+    step = max(signal.resolution, 1e-6 * reach, float(np.min(rises[rises > 1e-6 * reach], initial=reach)))
     for limit, side, firsts, ends in at_its_ends(x):
         count = 0
         for first, end in zip(firsts, ends, strict=True):
             if end - first < _HELD or first < _APPROACH:
                 continue
-            speed = abs(limit - x[first - _APPROACH]) / _APPROACH
+            before = x[max(first - 10 * (end - first) - _APPROACH, 0) : first - _APPROACH + 1]
+            far = np.flatnonzero(np.abs(limit - before) >= _APART * step)
+            back = int(len(before) - 1 - far[-1]) + _APPROACH if len(far) else len(before) + _APPROACH - 1
+            speed = abs(limit - x[first - back]) / back
             if signal.driven and np.any(np.diff(x[first - _APPROACH : first]) == 0):
                 continue
             moving = inertial or any(np.ptp(y[first:end]) > _MOVES * float(np.nanmax(y) - np.nanmin(y)) for y in others)
