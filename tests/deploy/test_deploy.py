@@ -373,7 +373,7 @@ def test_a_readme_is_one_screen(target: str, motor: Deployment) -> None:
 
 
 def test_the_command_takes_a_design_that_fits_into_the_ram(tmp_path: Path) -> None:
-    """The largest one: with a byte less there is another; of the fewest functions the bytes are told."""
+    """The largest one: with a byte less there is another. Where the smallest does not fit its bytes are named."""
     command = ("deploy", "dc_motor", "--for", "cmake", "--core", "q31", "-o", "out", "--force", "--ram")
     taken, notes = [10**6], []
     for _ in range(3):

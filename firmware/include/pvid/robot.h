@@ -62,9 +62,8 @@ typedef struct {
     const uint8_t *column; /* [slots] the parameter of each, ascending within a joint */
     const uint16_t *slot;  /* [entries] to which each result is added */
     const float *gain;     /* [n] of each recorded torque: 1, or a torque constant; 1e-9..1e9, either sign */
-    const float
-        *share;       /* [p] of what added noise changes: 1; 1/2 of dry friction, as its sign changes by both noises */
-    const bool *held; /* [n] the torque is held from its sample to the next */
+    const float *share;    /* [p] of what added noise changes: 1; of dry friction, whose sign both noises change, 1/2 */
+    const bool *held;      /* [n] the torque is held from its sample to the next */
     /* From q [rad, m], v [rad/s, m/s] and the mean of sgn(v) over a step, in[3][n]: out[entries]. */
     void (*values)(const float in[], float out[]);
 } pvid_robot_model_f32;

@@ -25,7 +25,7 @@ from pvid.settings.enums import Reason as CoreReason
 
 Float32 = npt.NDArray[np.float32]
 
-_CLASH = 4.0  # joint standard errors
+_CLASH = 4.0  # joint standard errors, of up to 64 parameters
 _MOST_REFUSED = 0.01
 _BEYOND = (CoreReason.REJECTED_SATURATED, CoreReason.REJECTED_NOT_FINITE)
 
@@ -97,15 +97,15 @@ def answer_of_robot_in_c(recording: Recording, model: CompiledModel) -> RobotCor
     answer = answer_of_robot(recording, model)
     samples, design = samples_of_core(answer.fit.run, recording), robot_core_design(model, recording)
 
-    def last(own: Float32) -> tuple[RobotNative, npt.NDArray[np.uint8]]:
+    def played(own: Float32) -> tuple[RobotNative, npt.NDArray[np.uint8]]:
         native = RobotNative(model, design)
         return native, native.run(own)[0]
 
-    whole, reasons = last(samples)
+    whole, reasons = played(samples)
     found = np.flatnonzero(reasons == CoreReason.UPDATED)
     end = int(found[-1]) + 1 if len(found) else 0
     p, _, number = whole.read()
-    halves = [last(one)[0].read() for one in np.array_split(samples, 2)]
+    halves = [played(one)[0].read() for one in np.array_split(samples, 2)]
     again = RobotNative(model, design)
     again.run(samples[:end])
     covariance = again.covariance() if end else np.zeros((again.p, again.p), np.float32)
@@ -117,9 +117,8 @@ def answer_of_robot_in_c(recording: Recording, model: CompiledModel) -> RobotCor
         halves=np.array([one[0] for one in halves], np.float64),
         undetermined=answer.fit.undetermined | (number == 0),
     )
-    known = ~(answer.fit.undetermined | fit.undetermined)
     joint = np.sqrt(np.diag(answer.fit.covariance) + np.diag(fit.covariance))
-    apart = np.flatnonzero(known & (np.abs(answer.fit.p - fit.p) > _CLASH * joint))
+    apart = np.flatnonzero(~fit.undetermined & (np.abs(answer.fit.p - fit.p) > _CLASH * joint))
     return RobotCoreAnswer(
         model,
         fit,

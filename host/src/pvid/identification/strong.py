@@ -11,6 +11,7 @@ import numpy as np
 from pvid.base.wording import listed
 from pvid.codegen.strong_library import strong_native
 from pvid.codegen.strong_library_q31 import StrongNativeQ31
+from pvid.configuration.shared import CLASH
 from pvid.configuration.strong import StrongDesign, reference_of, strong_design
 from pvid.configuration.strong_q31 import strong_design_to_identify
 from pvid.identification.analysis import analysed, refuse_constant
@@ -28,7 +29,6 @@ from pvid.settings.enums import Law, Reason
 
 _UNKNOWN_OF_RANGE = 0.5  # as in the verdict of the weak form
 _ROUNDING = 1e-6  # of the value: float32, of what constraints fix
-_CLASH = 3.0  # standard errors between the core and the analysis
 _GOOD = (Reason.UPDATED, Reason.MISFIT, Reason.ACCUMULATED)
 _DISTANCE = "their distance from the weak form"
 _BIAS = (
@@ -189,7 +189,7 @@ def _doubts(
         rest = len(near) < len(p)
         known = f"the distance of {listed(near)} from the weak form, and of the others {known}" if rest else _DISTANCE
     yield Doubt("noise", _BIAS.format(known))
-    bounds = np.maximum(_CLASH * np.hypot(noise, fitted.error), _ROUNDING * np.abs(fitted.p))
+    bounds = np.maximum(CLASH * np.hypot(noise, fitted.error), _ROUNDING * np.abs(fitted.p))
     apart = [one for one, x, y, most in zip(model.p_names, p, fitted.p, bounds, strict=True) if abs(x - y) > most]
     if apart:
         text = f"The C core and the float64 analysis disagree on {listed(apart)}."

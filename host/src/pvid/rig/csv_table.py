@@ -26,7 +26,7 @@ from pvid.base.units import scale_to
 from pvid.base.wording import listed, shown
 from pvid.rig.cells import PLAIN, Evidence, Style, is_missing, is_number, style_note, styles
 from pvid.rig.columns import TIME, Columns, MissingColumnError, unit_in, unit_in_brackets
-from pvid.rig.layout import Layout, find, split
+from pvid.rig.layout import Layout, counts_up, find, split
 from pvid.rig.printed_table import printed
 from pvid.rig.size import refuse_beyond
 from pvid.rig.stated_step import stated_step
@@ -150,7 +150,7 @@ class _TextTable:
         is_time_unit = unit_in(columns["t"].name, "s") or scale_to("s", units.get("t", "") or "1")
         if step is not None and not (notes or columns["t"].unit_given or self._time_is_text or is_time_unit):
             clock = TIME.is_called(columns["t"].name) and not layout.beside[0]
-            if not clock and _count_on([cells[self._places["t"]] for cells in body]):
+            if not clock and len(body) > 1 and counts_up([cells[self._places["t"]] for cells in body]):
                 columns, notes = step.of(columns), (f"{columns['t'].name} counts rows: one each {step}",)
                 units.pop("t")
         self._columns, of_units = columns.in_units_of_file(units)
@@ -283,15 +283,6 @@ def _rising(lines: Sequence[str], layout: Layout, columns: Columns) -> bool:
             if all(b > a for a, b in pairwise(float(one.replace(",", ".")) for one in own)):
                 return True
     return False
-
-
-def _count_on(cells: Sequence[str]) -> bool:
-    """Whether they are whole numbers, each one more than the one before it."""
-    try:
-        numbers = [int(cell) for cell in cells]
-    except ValueError:
-        return False
-    return len(numbers) > 1 and all(b == a + 1 for a, b in pairwise(numbers))
 
 
 def _front_note(lines: Sequence[str], layout: Layout) -> tuple[str, ...]:

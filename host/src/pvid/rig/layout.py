@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import islice
+from itertools import islice, pairwise
 
 from pvid.base.units import is_unit
 from pvid.rig.cells import is_missing, is_number
@@ -377,7 +377,13 @@ def _units(line: _Line, width: int) -> list[str]:
 
 def _counts(cells: Sequence[str]) -> bool:
     """Whether cells are 0, 1, 2, ... or 1, 2, 3, ..."""
+    return counts_up(cells) and int(cells[0]) in (0, 1)
+
+
+def counts_up(cells: Sequence[str]) -> bool:
+    """Whether cells are whole numbers, each one more than the one before it."""
     try:
-        return [int(cell) - int(cells[0]) for cell in cells] == list(range(len(cells))) and int(cells[0]) in (0, 1)
+        numbers = [int(cell) for cell in cells]
     except ValueError:
         return False
+    return all(b == a + 1 for a, b in pairwise(numbers))

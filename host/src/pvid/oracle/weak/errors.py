@@ -172,6 +172,8 @@ def without_motion(fit: Fit, designs: list[Float]) -> Float:
     root = np.linalg.cholesky(s * np.outer(scale, scale) + RIDGE * np.eye(len(s)))
     half = np.linalg.solve(root, np.linalg.solve(root, by_noise * np.outer(scale, scale)).T)
     share, turned = np.linalg.eigh((half + half.T) / 2)
+    if share[-1] < _NOISE_SHARE:
+        return np.zeros((len(unit), len(unit)))
     better = _chi2(fit, fit.residuals()) * (1 + _CHANCE * np.sqrt(2 / _free(fit)))  # sensors than declared
     share *= min(1.0, better)
     there = share >= _NOISE_SHARE
