@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import settings
 from processes import children_of
+from spread import run
 
 from bench.kinds import KINDS
 from pvid.base.freed_memory import keep_freed
@@ -48,7 +49,7 @@ SLOW = """
     identification/wild_samples board/port cli/output tools/proofs log/untrusted
     show/pictures tools/loops oracle/strong_described tools/analysis codegen/random
     board/block bench/hard log/export log/text_table core/dead_zone tools/mutate bench/model_boards
-    deploy/deploy_avr identification/skew bench/build_choices cli/result deploy/examples log/former_logs
+    deploy/deploy_avr identification/skew cli/result deploy/examples log/former_logs
     design/differentiation identification/following codegen/fitted_sizes identification/gallery
     sim/pendulum oracle/weak_segments base/packages core/snapshot_weak oracle/failures rig/former_files oracle/zero
     identification/weak_files_q31 model/mecanum core/weak_snapshot_q31
@@ -61,6 +62,7 @@ _NONE = SimpleNamespace(params={})
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="The long forms of the tests that have one.")
+    parser.addoption("--workers", type=int, default=1, help="Processes, each of which takes a file at a time.")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -74,6 +76,15 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers", "night: what is handed out or measured, as its user has it; in `./tools/test night`"
     )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session: pytest.Session) -> bool | None:
+    workers = session.config.getoption("--workers")
+    if workers == 1 or session.config.option.collectonly or session.testsfailed:
+        return None
+    run(session, workers)
+    return True
 
 
 @pytest.fixture

@@ -1,0 +1,67 @@
+"""Tests in several processes: each test runs once, and no failure is lost."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from pvid.core.sources import ROOT
+
+CONFTEST = """
+import pytest
+from spread import run
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session):
+    run(session, 2)
+    return True
+
+@pytest.fixture(scope="module")
+def file():
+    yield "open"
+    print("closed")
+"""
+GOOD = """
+import warnings
+
+def test_of_a_fixture(file, tmp_path):
+    assert file == "open" and tmp_path.is_dir()
+
+def test_with_a_warning():
+    warnings.warn("beware")
+
+def test_of_output(capfd):
+    print("a line")
+    assert capfd.readouterr().out == "a line\\n"
+"""
+WRONG = "def test_wrong():\n    print('shown')\n    assert 1 == 2\n"
+ENDS = "import os\n\ndef test_ends():\n    os._exit(3)\n\ndef test_behind():\n    pass\n"
+
+
+def _run(folder: Path, *options: str, **files: str) -> str:
+    (folder / "conftest.py").write_text(CONFTEST)
+    for name, text in files.items():
+        (folder / f"test_{name}.py").write_text(text)
+    code = f"import sys, pytest; sys.path.append({str(ROOT / 'tests')!r}); sys.exit(pytest.main())"
+    words = [sys.executable, "-c", code, "-p", "no:cacheprovider", "-p", "no:hypothesispytest", *options]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
+    return f"{done.stdout}{done.stderr}exit {done.returncode}"
+
+
+def test_every_test_runs_once_and_warnings_are_shown(tmp_path: Path) -> None:
+    many = {f"good_{k}": GOOD for k in range(5)}
+    found = _run(tmp_path, **many)
+    assert "15 passed, 5 warnings" in found and "beware" in found and found.endswith("exit 0")
+
+
+def test_a_failure_is_shown_and_a_process_that_ends_is_one(tmp_path: Path) -> None:
+    found = _run(tmp_path, good=GOOD, wrong=WRONG, ends=ENDS)
+    assert "assert 1 == 2" in found and "shown" in found
+    assert "test_ends.py::test_ends - its process ended with 3" in found.replace("FAILED ", "")
+    assert "2 failed, 3 passed" in found and found.endswith("exit 1")
+
+
+def test_after_the_first_failure_no_further_file_is_begun(tmp_path: Path) -> None:
+    many = {f"wrong_{k}": WRONG for k in range(50)}
+    found = _run(tmp_path, "-x", **many)
+    failed = int(found.rpartition(" failed")[0].rpartition(" ")[2])
+    assert 1 <= failed < 50 and found.endswith("exit 1") or "exit 2" in found
