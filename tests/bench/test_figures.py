@@ -95,19 +95,6 @@ def test_what_was_written_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert found.column("R^2, %") == ["1", ""] and found.where(name="b, c") == [{"name": "b, c", "R^2, %": "1"}]
 
 
-def test_rows_that_a_command_does_not_measure_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for word, rows in (("all", [("a", "1"), ("b", "1")]), ("b", [("b", "2"), ("c", "2")]), ("b", [("b", "3")])):
-        monkeypatch.setattr(sys, "argv", ["pvid", "bench", word])
-        put_results(tmp_path, "a", ("name", "x"), rows, keys=1)
-    found = read_results(tmp_path / "a.csv")
-    assert found.rows == [("a", "1"), ("b", "3"), ("c", "2")] and found.made["command"] == "./tools/pvid bench b"
-    assert found.made["earlier"].startswith("./tools/pvid bench all, ") and "bench b" not in found.made["earlier"]
-    put_results(tmp_path, "a", ("name", "x"), [("a", "4"), ("b", "4"), ("c", "4")], keys=1)
-    assert "earlier" not in read_results(tmp_path / "a.csv").made  # all measured anew
-    put_results(tmp_path, "a", ("name", "y"), [("a", "5")], keys=1)
-    assert read_results(tmp_path / "a.csv").rows == [("a", "5")]  # another table
-
-
 def test_without_a_folder_a_table_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     put_results(None, *counts("a", [("runs", 3)]))
     assert capsys.readouterr().out == "| what | number |\n|---|---|\n| runs | 3 |\n"

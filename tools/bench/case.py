@@ -77,7 +77,6 @@ class Case:
     tables : that it writes, without the endings that options give them
     rows : in place of a report: tables, their headers' names and those of the functions of their rows, which take
         mechanisms, a number and `advance`
-    keys : cells that name a row: a command that measures some rows leaves the others of the table
     """
 
     name: str
@@ -86,7 +85,6 @@ class Case:
     tables: tuple[str, ...] = ()
     options: Sequence[click.Parameter] = ()
     rows: tuple[tuple[str, str, str], ...] = ()
-    keys: int = 0
 
     @property
     def written(self) -> tuple[str, ...]:

@@ -47,27 +47,6 @@ CASES = (
         ),
     ),
     Case(
-        "strong",
-        "The strong form in C beside the weak form, with finer and finer encoders.",
-        "strong",
-        options=_number("--seeds", 80),
-        rows=(("strong-sensors", "HEADER", "rows"),),
-    ),
-    Case(
-        "starts",
-        "From how far off both forms in C converge.",
-        "strong",
-        options=_number("--starts", 40, "Of each factor."),
-        rows=(("starts", "RADIUS_HEADER", "radius_rows"),),
-    ),
-    Case(
-        "norm",
-        "The strong form with all rows of an instant in one norm, beside rows that are weighted apart.",
-        "strong",
-        options=_number("--seeds", 80),
-        rows=(("strong-norm", "NORM_HEADER", "norm_rows"),),
-    ),
-    Case(
         "refine-mechanisms",
         "Both stages in C: errors beside the Cramer-Rao bound.",
         "refine_mechanisms",
@@ -110,12 +89,6 @@ CASES = (
         ),
     ),
     Case(
-        "build-choices",
-        "What each choice of a build of the weak form takes and gives, on the pendulum's shipped rig.",
-        "build_choices",
-        ("build-choices",),
-    ),
-    Case(
         "model-boards",
         "The weak form of every mechanism on emulated boards, in both cores: its bits and the cost of a tick.",
         "model_boards",
@@ -149,19 +122,6 @@ CASES = (
         ),
     ),
     Case(
-        "peers",
-        "pvid beside SciPy, CasADi, pysindy, PyBOP, MuJoCo, Pinocchio and the textbook, on the same recordings.",
-        "peers.compare",
-        ("peers",),
-        (
-            option("--seeds", 20, "Recordings of each row."),
-            option("--seconds", 30, "Of the processor for a row: the next recording is left out."),
-            click.Option(["--tool"], multiple=True, help="A file of tools/bench/peers. Default: all."),
-            click.Option(["--mechanism"], multiple=True, help="Default: all."),
-        ),
-        keys=3,
-    ),
-    Case(
         "fuzz-link",
         "The C side of the serial link under libFuzzer, with sanitizers (needs clang).",
         "fuzz:link_report",
@@ -192,6 +152,12 @@ FROZEN = (
         "tests/cli/test_mutants.py",
     ),
     Frozen(
+        "build-choices",
+        "What each choice of a build of the weak form takes and gives, on the pendulum's shipped rig.",
+        ("build-choices",),
+        "tests/codegen/test_fitted_sizes.py tests/board/test_targets.py",
+    ),
+    Frozen(
         "cell",
         "RC models on a cell that is no RC circuit, simulated by PyBaMM.",
         ("cell",),
@@ -214,6 +180,30 @@ FROZEN = (
         "Real rigs of other laboratories: identified from one run, another one predicted, beside the published values.",
         ("recordings", "predictions", "verdicts", "traps"),
         "tests/identification/test_recorded_rigs.py",
+    ),
+    Frozen(
+        "peers",
+        "pvid beside SciPy, CasADi, pysindy, PyBOP, MuJoCo, Pinocchio and the textbook, on the same recordings.",
+        ("peers",),
+        "tests/bench/test_mechanisms.py tests/bench/test_refine_mechanisms.py",
+    ),
+    Frozen(
+        "norm",
+        "The strong form with all rows of an instant in one norm, beside rows that are weighted apart.",
+        ("strong-norm",),
+        "tests/core/test_strong_errors.py",
+    ),
+    Frozen(
+        "starts",
+        "From how far off both forms in C converge.",
+        ("starts",),
+        "tests/core/test_strong_errors.py tests/bench/test_weak.py",
+    ),
+    Frozen(
+        "strong",
+        "The strong form in C beside the weak form, with finer and finer encoders.",
+        ("strong-sensors",),
+        "tests/core/test_strong_errors.py",
     ),
     Frozen(
         "strong-mechanisms",
@@ -285,7 +275,7 @@ def _add(one: Case) -> None:
             click.echo(line)
         for name, header, rows in tables:
             if rows:
-                put_results(data, name, header, rows, one.keys)
+                put_results(data, name, header, rows)
         for fault in report.faults:
             write_stderr(f"pvid: {fault}")
         wrong = report.faults or any(DIFFERS in row for _, _, rows in tables for row in rows)

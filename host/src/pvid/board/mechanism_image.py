@@ -221,7 +221,6 @@ def build_with(
     room: str = "weak",
     *,
     refined: bool = False,
-    choices: Mapping[str, str] | None = None,
 ) -> tuple[Path, Path]:
     """The same from generated files: name -> text.
 
@@ -229,7 +228,6 @@ def build_with(
     ----------
     room : of the core, of the form
     refined : the files of the second stage are among them
-    choices : further variables of CMake
     """
     stamp = zlib.crc32("".join(files.values()).encode())
     whole = f"{name}-{stamp:08x}"
@@ -239,6 +237,6 @@ def build_with(
     options = {"PVID_REPLAY_RUN": str(folder), "PVID_LEAVE_OUT": left_out(room, core, *(["refine"] if refined else []))}
     if refined:
         options["PVID_REFINE_MODEL"] = str(folder)
-    options |= {macro: str(size) for macro, size in smallest(sizes).items()} | dict(choices or {})
+    options |= {macro: str(size) for macro, size in smallest(sizes).items()}
     tree = build(target, BUILD / f"{target.name}-{whole}", options)
     return tree / "apps" / "replay" / "replay.elf", tree

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -118,12 +118,10 @@ def header(run: RefinedRun, text: str) -> str:
     return text.replace(_START, own).replace(_HASH, "#define REPLAY_HASH replay_hash")
 
 
-def build_refined_image(
-    target: Board, run: RefinedRun, name: str = "", choices: Mapping[str, str] | None = None
-) -> tuple[Path, Path]:
-    """Builds the image; see `build_mechanism_image`. `choices`: further variables of CMake, of a build of that name."""
+def build_refined_image(target: Board, run: RefinedRun) -> tuple[Path, Path]:
+    """Builds the image; see `build_mechanism_image`."""
     files = files_of(run.weak) | files_refine.files_of(run.made, MADE_BY)
     files["replay_run.h"] = header(run, files["replay_run.h"])
-    whole = name or f"{run.weak.name}-refined-f32-{len(run.weak.counts)}"
+    name = f"{run.weak.name}-refined-f32-{len(run.weak.counts)}"
     sizes = fitted_sizes(run.weak.config, refined=True)
-    return build_with(target, whole, files, sizes, "f32", refined=True, choices=choices)
+    return build_with(target, name, files, sizes, "f32", refined=True)

@@ -60,27 +60,10 @@ def read_results(path: Path) -> Results:
     return Results(header, rows, made)
 
 
-def put_results(
-    folder: Path | None, name: str, header: Sequence[str], rows: Iterable[Sequence[str]], keys: int = 0
-) -> None:
-    """Writes the table NAME.csv into the folder; prints it, as Markdown, where there is none.
-
-    Parameters
-    ----------
-    keys : cells at the front that name a row: of a table that is there, rows of other names stay; 0: none stays
-    """
+def put_results(folder: Path | None, name: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Writes the table NAME.csv into the folder; prints it, as Markdown, where there is none."""
     cells = [tuple(row) for row in rows]
     made = {"command": _command(), "commit": _commit(), "date": f"{datetime.now(UTC):%Y-%m-%d}"}
-    if keys and folder is not None and (folder / f"{name}.csv").exists():
-        before = read_results(folder / f"{name}.csv")
-        if before.header == tuple(header):
-            new = {row[:keys]: row for row in cells}
-            kept = {row[:keys]: row for row in before.rows}
-            cells = [*(kept | new).values()]
-            parts = before.made.pop("earlier", "").split(" | ") if kept.keys() - new.keys() else []
-            parts += [", ".join(before.made.values())] if parts else []
-            own = [one for one in parts if one and not one.startswith(f"{made['command']}, ")]
-            made |= {"earlier": " | ".join(own)} if own else {}
     if folder is None:
         click.echo(markdown(tuple(header), cells))
         return
