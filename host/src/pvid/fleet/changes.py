@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from pvid.fleet.row import Row
 
@@ -135,7 +135,7 @@ class Series:
         """Whether a change that takes `gain` from a sum of squares is beyond chance: Student's t of n - 2 degrees of
         freedom, with the scatter about it, or the noise where that is larger."""
         variance = max(1.0, (whole - gain) / (n - 2))
-        return bool((gain / variance) ** 0.5 > student.isf(chance / 2, n - 2))
+        return bool((gain / variance) ** 0.5 > -stdtrit(n - 2, chance / 2))
 
     def _steps(self, marks: Sequence[int]) -> Iterator[Change]:
         """Between the stretches that begin at `marks`."""
