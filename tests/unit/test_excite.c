@@ -6,7 +6,7 @@
 
 #include "pvid/excite.h"
 
-#define DRAWS 10000
+#define DRAWS ((int)(10000u / ONE_IN))
 #define PI 3.14159265358979323846
 
 static pvid_excite_f32 self;
