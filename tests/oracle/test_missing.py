@@ -57,18 +57,19 @@ def test_model_that_lacks_nothing_is_left_alone(plant: str) -> None:
     assert np.all(clean.found.by_model < 0.5 * clean.found.se)
 
 
+@pytest.mark.by_day(4)
 @pytest.mark.parametrize(
     ("plant", "effect", "words"),
     [
         ("cart", "drag", r"lack 0\.(79|8)\d*\*abs\(x\.d\(\)\)\*x\.d\(\)"),
-        ("cart", "cubic spring", r"lack (99\d|1e\+03|1\.0\de\+03)\*x\*\*3"),
-        ("cart", "dry friction", r"lack 0\.1[45]\d*\*sgn\(x\.d\(\)\)"),
         ("cart", "saturation [N]", r"F saturates at (3\.9\d?|4|4\.0\d) N"),
         ("cart", "dead band [N]", r"F has a dead band of 0\.(39|4)\d* N"),
-        ("cart", "sag with load", r"F acts as F\*\(1 - 0\.\d+\*abs\(F\)/"),
         # The current passes 0 within a sample: where is not recorded.
         ("motor", "brush drop [V]", r"lack 0\.(2[6789]|30)\d*\*sgn\(i\)"),
         ("motor", "fan torque", r"lack (1\.9\d*|2|2\.0\d)e-06\*abs\(w\)\*w"),
+        ("cart", "sag with load", r"F acts as F\*\(1 - 0\.\d+\*abs\(F\)/"),
+        ("cart", "cubic spring", r"lack (99\d|1e\+03|1\.0\de\+03)\*x\*\*3"),
+        ("cart", "dry friction", r"lack 0\.1[45]\d*\*sgn\(x\.d\(\)\)"),
         ("pendulum", "saturation [N m]", r"M saturates at 0\.8[3-6]\d* N\*m"),
         ("lag", "square", r"lack 0\.0(29|3)\d*\*abs\(y\)\*y"),
     ],
@@ -123,6 +124,7 @@ def found_of(plant: str, effect: str, size: float) -> Told:
     return found
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("plant", "effect", "size", "words"),
     [
@@ -155,6 +157,7 @@ def test_what_a_run_does_not_distinguish_is_listed(plant: str, effect: str) -> N
     assert found.found.named and not found.named_wrongly
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("plant", "effect", "size", "words"),
     [
