@@ -137,6 +137,7 @@ def hostile(samples: Float32) -> Float32:
     return out.astype(np.float32)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", ["kapitza", "dc_motor", "cart_pendulum", "battery_2rc"])
 def test_hostile_samples_equal_the_twin_and_leave_finite_numbers(name: str) -> None:
     rig = weak_rig(name)
@@ -240,6 +241,7 @@ def random_case(seed: int) -> tuple[WeakRig, WeakConfig, Float32]:
     return rig, config, samples
 
 
+@pytest.mark.by_day(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_random_settings_and_faults_equal_the_twin(seed: int) -> None:
     rig, config, samples = random_case(seed)

@@ -80,6 +80,7 @@ def test_the_bits_of_a_model_do_not_depend_on_the_room_for_unknowns() -> None:
         assert np.array_equal(getattr(record, field), getattr(other, field))
 
 
+@pytest.mark.by_day(2)
 def test_hostile_readings_have_the_bits_of_the_twin(one: Rig) -> None:
     """Offsets, jumps beyond full scale and the reach of jets, a frozen stretch, too little drive, a gate."""
     random = np.random.default_rng(5)
@@ -97,6 +98,7 @@ def test_hostile_readings_have_the_bits_of_the_twin(one: Rig) -> None:
     assert np.sum(reasons == Reason.REJECTED_SATURATED) >= 2
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("law", [{"divider": 3}, {"gain": 2**29, "divider": 2}, {"gain": 0}, {"forgetting_groups": 4}])
 def test_other_laws_have_the_bits_of_the_twin(law: dict[str, Any]) -> None:
     """Their scores are those of several windows, or weigh as much as forgetting leaves."""
