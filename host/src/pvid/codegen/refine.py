@@ -295,8 +295,18 @@ def _equations(model: CompiledModel) -> tuple[sp.Expr, ...]:
     """Those of the refinement: integrals of what the run sets are inputs, not coordinates."""
     if model.refinement.equations:
         return model.refinement.equations
-    integrals = {jet.of for jet, value in model.opaque.items() if value.has(Integral)}
-    return tuple(one for one in model.equations if not any(jet.of in integrals and jet.order == 1 for jet in jets(one)))
+    set_ones = {one.of for one in _set_integrals(model)}
+    return tuple(one for one in model.equations if not any(jet.of in set_ones and jet.order == 1 for jet in jets(one)))
+
+
+def _set_integrals(model: CompiledModel) -> set[Jet]:
+    """Integrals of what the run sets; that of a sensor is a coordinate: as an input it would walk."""
+    given = {one.name for one in model.signals if one.driven or one.kind == "input"}
+    return {
+        jet
+        for jet, value in model.opaque.items()
+        if value.has(Integral) and (model.refinement.equations or {one.of for one in jets(value)} <= given)
+    }
 
 
 class _Refine:
@@ -321,7 +331,8 @@ class _Refine:
                 else:
                     self.widths[mark] = argument
         inputs_of = {one.name for one in model.signals if one.driven or one.kind == "input"}
-        inputs_of |= {jet.of for jet in model.opaque}
+        walked = {jet for jet, value in model.opaque.items() if value.has(Integral)} - _set_integrals(model)
+        inputs_of |= {jet.of for jet in model.opaque if jet not in walked}
         self._equations = equations
         whole = [*equations, *own.outputs.values()]
         found = {jet for one in whole for jet in jets(one)}
@@ -340,7 +351,8 @@ class _Refine:
             raise PvidError(f"{model.name}: the second stage needs a motion; no equation has a derivative")
         self.highest = [Jet(name, top[name]) for name in free]
         jumps = any(one.hold == "zoh" and not one.smooth for one in model.signals)  # which spoil the steps of Adams
-        self.runge_kutta = widths is not None and (bool(signs) or len(set(top.values())) > 1 or jumps)
+        mixed = len(set(top.values())) > 1 or bool(walked)
+        self.runge_kutta = widths is not None and (bool(signs) or mixed or jumps)
         self.order = 2 if all(n == 2 for n in top.values()) and not self.runge_kutta else 1
         if self.order == 2:
             self.q = [Jet(name) for name in free]
@@ -497,6 +509,10 @@ class _Refine:
         self._matrix = matrix
         self._inverse = self._inverted()
         self._h = self._solved([self._symbol(f"right_{i}", one) for i, one in enumerate(right)], "h_{}")
+        for j, one in enumerate(self._h):  # x' = v: v is a coordinate, and stays fixed below as a rate alone
+            if one.is_Symbol and one not in self._definitions:
+                self._h[j] = sp.Symbol(f"h_{j}")
+                self._definitions[self._h[j]] = one
         # what is 0 for the solution: its derivatives at fixed h are the right sides of all columns
         self._rest = [right[i] - sum((matrix[i, j] * self._h[j] for j in range(n)), _ZERO) for i in range(n)]
         self._by_inner = {

@@ -143,7 +143,7 @@ def _moves_nothing(model: CompiledModel, fit: Fit, given: Signal, outputs: list[
         columns = rows.columns[kind]
         thetas = len(found[kind])
         terms = np.einsum("wjk,j->wk", columns[:, :thetas], at_guess[kind]).reshape(-1)
-        noise = rows.windows * float(np.trace(rows.noise.covariance(kind, at_guess[kind], kind, at_guess[kind])))
+        noise = rows.windows * rows.noise.size(kind, at_guess[kind])
         missing = (rest(terms) - noise) / float(gain) ** 2
         model_left = float(np.sum((columns[:, thetas] - np.einsum("wjk,j->wk", columns[:, :thetas], found[kind])) ** 2))
         left = rest(u)

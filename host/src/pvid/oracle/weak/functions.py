@@ -117,6 +117,11 @@ class TestFunctions:
             self._grams[first, second] = self.combine(first).T @ (energy[:, np.newaxis] * self.combine(second))
         return self._grams[first, second]
 
+    def values(self, order: int) -> Float:
+        """chi^(order) at the samples of a window [2 hop, K]."""
+        turns = np.exp(1j * np.outer(self.dt * np.arange(2 * self.hop), self.rates))
+        return np.asarray(np.real(turns @ self._rated(order)))
+
     @cached_property
     def _grams(self) -> dict[tuple[int, int], Float]:
         return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,10 +12,11 @@ import numpy.typing as npt
 import sympy as sp
 
 from pvid.model.evaluation import numpy_function
-from pvid.model.signals import Integral, jets
+from pvid.model.signals import Integral, Jet, jets
 from pvid.oracle.weak.channels import Channels, Record, broadcast
 from pvid.oracle.weak.front import density
 from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.walks import Walks
 from pvid.oracle.weak.whitener import Holders, holders
 
 
@@ -30,9 +32,10 @@ class Gain:
 class NoiseFilters:
     """How the noise of each sensor enters the columns of each row kind, to first order, from the symbolic derivatives.
 
-    D^m[psi(z, z')] with noise n in z: sum over d of (-1)^m (-D)^d [chi^(m) dpsi/dz^(d)] n. Running integrals smooth
-    their noise away and are left out. Noise of a velocity enters through a soft sign by its slope; where reversals are
-    located it is in their times (`ReversalNoise`).
+    D^m[psi(z, z')] with noise n in z: sum over d of (-1)^m (-D)^d [chi^(m) dpsi/dz^(d)] n. In an integral since the
+    start of the run d is negative: it walks. Integrals from the start of a window smooth their noise away and are left
+    out. Noise of a velocity enters through a soft sign by its slope; where reversals are located it is in their times
+    (`ReversalNoise`).
     """
 
     def __init__(self, channels: Channels) -> None:
@@ -42,7 +45,8 @@ class NoiseFilters:
         self._sign_slopes = {mark: sp.Symbol(f"slope_of_{mark}", real=True) for mark in marks}
         self.entries: list[tuple[int, str, int]] = []  # channel, sensor, order of the jet
         expressions: list[sp.Expr] = []
-        auxiliary = {jet: expression for jet, expression in channels.opaque.items() if not expression.has(Integral)}
+        integrals = {jet: expression for jet, expression in channels.opaque.items() if expression.has(Integral)}
+        auxiliary = {jet: expression for jet, expression in channels.opaque.items() if jet not in integrals}
         for place, one in enumerate(channels.channels):
             if one.fold:
                 continue
@@ -56,6 +60,11 @@ class NoiseFilters:
                     if channels.model.signal(jet.of).sd > 0:
                         self.entries.append((place, jet.of, jet.order))
                         expressions.append(slope)
+            for jet, expression in integrals.items():
+                for inner, depth, slope in _within(expression) if full.has(jet) else ():
+                    if channels.model.signal(inner.of).sd > 0:
+                        self.entries.append((place, inner.of, depth))
+                        expressions.append(sp.diff(full, jet) * slope)
         given = (*channels.plain, *self._sign_slopes.values())
         self._function = numpy_function(given, expressions)
 
@@ -69,7 +78,7 @@ class NoiseFilters:
         chains = []
         for (_, _, depth), slope in zip(self.entries, slopes, strict=True):
             chain = [slope]
-            for _ in range(depth):
+            for _ in range(max(depth, 0)):
                 slopes_of_parts = [slope_of(chain[-1][part], smooth, design.dt) for part in parts]
                 chain.append(slopes_of_parts[0] if len(parts) == 1 else np.concatenate(slopes_of_parts))
             chains.append(chain)
@@ -84,7 +93,8 @@ class NoiseFilters:
                         continue
                     # (-1)^m (-D)^d [chi^(m) g] = (-1)^(m + d) sum_i C(d, i) chi^(m + d - i) g^(i)
                     for i, g in enumerate(chain):
-                        factor = (-1.0) ** (term.order + depth) * float(sp.binomial(depth, i)) * term.factor
+                        binomial = float(sp.binomial(depth, i)) if i else 1.0
+                        factor = (-1.0) ** (term.order + depth) * binomial * term.factor
                         key = (sensor, term.column, term.order + depth - i)
                         share = factor * g
                         found[key] = found[key] + share if key in found else share
@@ -105,19 +115,38 @@ def slope_of(g: Float, reach: int, dt: float) -> Float:
     return np.asarray((g[high] - g[low]) / (dt * (high - low)))
 
 
+def _within(expression: sp.Expr) -> list[tuple[Jet, int, sp.Expr]]:
+    """Jets in a signal that is made of running integrals, how often each is differentiated (negative: integrated), and
+    the signal's slope; of an integral inside a curve nothing."""
+    marks = {one: sp.Dummy() for one in sorted(expression.atoms(Integral), key=sp.default_sort_key)}
+    outside = expression.xreplace(marks)
+    found = [(jet, jet.order, sp.diff(outside, jet)) for jet in sorted(jets(outside), key=str)]
+    for one, mark in marks.items():
+        integrand, fold = one.args
+        inside = sorted(jets(integrand), key=str)
+        found += [(jet, jet.order - int(fold), sp.diff(outside, mark) * sp.diff(integrand, jet)) for jet in inside]
+    return [one for one in found if not one[2].free_symbols & set(marks.values())]
+
+
 class NoiseModel:
     """Covariances of the rows of a window, R0(p), and of neighbours, R1(p), of each pair of row kinds.
 
     With gains averaged over the run, R0 = sum over pairs of orders P_mn(theta) gram(m, n), gram from the harmonics.
+
+    The noise in an integral since the start of the run is that of the window, of negative order, and a walk up to its
+    start, which all later windows have in common: in a window of the weights it has the trace of its covariance over
+    all windows, which is no less than its largest eigenvalue. Independent windows with that have larger errors than
+    those that walk, whatever the motion.
     """
 
     def __init__(self, filters: NoiseFilters, record: Record) -> None:
         self.functions = record.grid.design.test_functions
+        self._walks = Walks(self.functions, record.grid.parts)
         of_kinds = filters.gains(record)
         self._columns = max(row.thetas + 1 for row in filters.channels.rows)
         self._sensors: list[_SensorGains] = []
         for sensor in sorted(set().union(*of_kinds)):
-            own = [(kind, gain) for kind, row in enumerate(of_kinds) for gain in row.get(sensor, [])]
+            own = [(kind, self._numbered(gain)) for kind, row in enumerate(of_kinds) for gain in row.get(sensor, [])]
             stack = np.array([gain.values for _, gain in own])
             there = np.isfinite(stack).all(axis=0)
             stack = stack if there.all() else stack[:, there]
@@ -130,12 +159,15 @@ class NoiseModel:
                     np.array([gain.order for _, gain in own]),
                 )
             )
+        self._orders = len(self._walks) + 1 + max((int(np.max(one.orders)) for one in self._sensors), default=0)
         self._pairs: dict[tuple[int, int], list[_Pairs]] = {}
 
-    @cached_property
-    def _orders(self) -> int:
-        """One more than the highest order."""
-        return 1 + max((int(np.max(one.orders)) for one in self._sensors), default=0)
+    def _numbered(self, gain: Gain) -> Gain:
+        """One of a negative order as a walk's, whose kernel holds the values."""
+        if gain.order >= 0:
+            return gain
+        self._walks.add(-gain.order, gain.values)
+        return Gain(gain.column, -len(self._walks), np.ones(gain.values.shape))
 
     def _of_orders(self, a: int, theta_a: Float, b: int, theta_b: Float, of_y: float = -1.0) -> Float:
         """Weights P of the pairs of orders of two kinds [orders, orders]."""
@@ -152,7 +184,8 @@ class NoiseModel:
             found = []
             for one in self._sensors:
                 i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
-                places = one.orders[i][:, np.newaxis] * self._orders + one.orders[j]
+                left, right = one.orders[i] + len(self._walks), one.orders[j] + len(self._walks)
+                places = left[:, np.newaxis] * self._orders + right
                 found.append(_Pairs(one.columns[i], one.columns[j], one.products[np.ix_(i, j)], places.reshape(-1)))
             self._pairs[a, b] = found
         return self._pairs[a, b]
@@ -161,15 +194,16 @@ class NoiseModel:
         """P [powers, columns, columns] with D_h = sum_j omega_h^(2 j) theta^T P_j theta, theta = -1 for Y's column.
 
         D_h is the variance a step of the noise at harmonic h. It is that of `covariance`, because gram(m, n) is
-        (-1)^((m - n)/2) times the one of m + n halved, and those of odd sums cancel.
+        (-1)^((m - n)/2) times the one of m + n halved, and those of odd sums cancel. That of running integrals is left
+        out.
         """
-        out = np.zeros((self._orders, self._columns, self._columns))
+        out = np.zeros((self._orders - len(self._walks), self._columns, self._columns))
         for one in self._sensors:
             own = np.flatnonzero(one.kinds == kind)
             for i in own:
                 for j in own:
                     m, n = int(one.orders[i]), int(one.orders[j])
-                    if (m + n) % 2 == 0:
+                    if (m + n) % 2 == 0 and min(m, n) >= 0:
                         sign = (-1.0) ** ((m - n) // 2)
                         out[(m + n) // 2, one.columns[i], one.columns[j]] += sign * one.products[i, j]
         return out
@@ -187,7 +221,7 @@ class NoiseModel:
         """tr(weight E[n_i n_j^T]) of the noises n_i in each column of kind a and n_j in each of kind b
         [columns, columns]; weight [K, K] stands at the rows of a and b."""
         out = np.zeros(self._columns**2)
-        traces = np.einsum("mnkl,kl->mn", self._grams, weight, optimize=True).reshape(-1)
+        traces = np.einsum("mnkl,kl->mn", self._grams_of_run, weight, optimize=True).reshape(-1)
         for one in self._pairs_of(a, b):
             shares = one.products.reshape(-1) * traces[one.places]
             places = one.first[:, np.newaxis] * self._columns + one.second
@@ -199,19 +233,37 @@ class NoiseModel:
         right = np.append(theta_b, -1.0)
         return np.asarray(self.within(a, b, weight)[:, : len(right)] @ right)
 
+    def size(self, kind: int, theta: Float) -> float:
+        """Sum of squares of the noise in the rows of a kind in one window, on average over the run."""
+        weight = np.eye(self.functions.count)
+        of_y = np.append(theta, -1.0)
+        return float(of_y @ self.within(kind, kind, weight)[: len(of_y), : len(of_y)] @ of_y)
+
     @cached_property
     def _grams(self) -> Float:
-        """Of all pairs of orders [orders, orders, K, K]."""
-        return self._of_all(self.functions.gram)
+        """Of all pairs of orders [orders, orders, K, K]; of a walk its sum over the windows."""
+        return self._of_run(1)
+
+    @cached_property
+    def _grams_of_run(self) -> Float:
+        """The same with the mean of a walk."""
+        return self._of_run(0) if len(self._walks) else self._grams
+
+    def _of_run(self, windows: int) -> Float:
+        out = self._of_all(self.functions.gram, self._walks.gram)
+        walks = range(len(self._walks))
+        for m, n in itertools.product(walks, walks):
+            out[m, n] += self._walks.before(m - len(walks), n - len(walks), windows)
+        return out
 
     @cached_property
     def _overlaps(self) -> Float:
-        """The same of neighbours."""
-        return self._of_all(self.functions.overlap)
+        """The same of neighbours, within the half that they share."""
+        return self._of_all(self.functions.overlap, self._walks.overlap)
 
-    def _of_all(self, of: Callable[[int, int], Float]) -> Float:
-        orders = range(self._orders)
-        return np.array([[of(m, n) for n in orders] for m in orders])
+    def _of_all(self, plain: Callable[[int, int], Float], of_walks: Callable[[int, int], Float]) -> Float:
+        orders = range(-len(self._walks), self._orders - len(self._walks))
+        return np.array([[(plain if min(m, n) >= 0 else of_walks)(m, n) for n in orders] for m in orders])
 
 
 @dataclass(frozen=True)
