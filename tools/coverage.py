@@ -55,6 +55,7 @@ MECHANISMS = (
     *(f"tests/{name}.py" for name in ("twin/test_commissioning", "deploy/test_commission", "codegen/test_robot_core")),
     "tests/board/test_block.py",  # samples in blocks
     "tests/codegen/test_fitted_sizes.py",  # builds for one design
+    *(f"tests/codegen/test_strong_{name}.py" for name in ("model", "model_q31")),  # the printed strong form
 )
 # A compiler that counts branches, but not those of a sanitizer; each call has a folder of its own, since objects of
 # several builds have one name.
@@ -123,7 +124,7 @@ def play_mechanisms() -> None:
         text = COUNTING.format(gcc=shutil.which(name), options=shlex.join(COUNTED), folder=counts)
         (tools / name).write_text(text, encoding="utf-8")
         (tools / name).chmod(0o755)
-    options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q", "-m", "not night")
+    options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q")
     path = os.pathsep.join((str(tools), os.environ["PATH"]))
     given = {"PATH": path, "CC": str(tools / "gcc"), "CCACHE_DISABLE": "1"}
     run(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS, **given)
