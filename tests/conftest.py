@@ -52,7 +52,7 @@ SLOW = """
     deploy/deploy_avr identification/skew cli/result deploy/examples log/former_logs
     design/differentiation identification/following codegen/fitted_sizes identification/gallery
     sim/pendulum oracle/weak_segments base/packages core/snapshot_weak oracle/failures rig/former_files oracle/zero
-    identification/weak_files_q31 model/mecanum core/weak_snapshot_q31
+    identification/weak_files_q31 model/mecanum core/weak_snapshot_q31 core/strong_errors
 """.split()
 # Of tests of every mechanism in bench.kinds those of these four: relaxations, an integral, an algebraic output; corners
 # and dry friction; an input that is a derivative; a hidden coordinate of order two. The others are tests of the night.
