@@ -4,8 +4,11 @@ import json
 import os
 import re
 import tarfile
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import yaml  # type: ignore[import-untyped]
@@ -18,6 +21,8 @@ from program import pvid
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.boards import run as run_on
+from pvid.board.tick_bound import TickBound
+from pvid.cli.deploy import _within
 from pvid.configuration.refine import full_motion_of, refine_for_simulated_rig
 from pvid.configuration.weak import config_for_recording, config_for_simulated_rig, simulated_run_of
 from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_simulated_rig
@@ -385,6 +390,39 @@ def test_the_command_takes_a_design_that_fits_into_the_ram(tmp_path: Path) -> No
     assert notes == [False, True, True] and all(b < a for a, b in pairwise(taken))
     refused = pvid(tmp_path, *command, "1000")
     assert refused.returncode == 2 and "with the fewest test functions the first stage takes" in refused.stderr
+
+
+@pytest.mark.parametrize(("ticks", "number"), [(500, None), (449, 8), (260, 5), (100, 0)])
+def test_the_command_takes_the_largest_design_within_the_instructions_of_a_tick(
+    ticks: int, number: int | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """50 instructions for each of 10 test functions; with fewer than 7 the second stage has no estimate. The smallest
+    design has 4."""
+
+    def made(functions: int | None) -> Any:
+        n = functions or 10
+        most = TickBound(50 * n, 20 * n, {}, {})
+        one = SimpleNamespace(sizes={"PVID_MAX_FUNCTIONS": n}, most=most, is_refined=n > 6)
+        return SimpleNamespace(with_ticks=lambda: one)
+
+    if number == 0:
+        with pytest.raises(PvidError, match="a tick takes up to 200 instructions by its code, and 80 in a search"):
+            _within(None, ticks, None, made)
+        return
+    fits = _within(None, ticks, None, made)
+    notes = capsys.readouterr().err
+    assert fits.sizes["PVID_MAX_FUNCTIONS"] == (number or 10)
+    assert ("test functions in place of 10, for " in notes) == (number is not None)
+    assert ("the second stage has no estimate" in notes) == (number == 5)
+
+
+def test_a_readme_names_the_bounds_of_time_and_stack(motor: Deployment) -> None:
+    def notes(one: Deployment) -> str:
+        return TARGETS["cmake"](one)["README.md"]
+
+    assert "`pvid deploy --ticks N` bounds the instructions of a tick" in notes(motor)
+    known = notes(replace(motor, most=TickBound(1234, 567, {}, {}, 448)))
+    assert "at most 1234 instructions" in known and "took 567 in a search" in known and "at most 448 bytes" in known
 
 
 @pytest.mark.slow

@@ -103,6 +103,14 @@ CASES = (
         ),
     ),
     Case(
+        "ticks",
+        "The longest tick of mechanisms on a Cortex-M4F: by a search with spoilt samples, and bounded by the code.",
+        "ticks",
+        ("ticks",),
+        (click.Option(["--mechanism"], multiple=True, help="Only this one; may be given again. Default: all."),),
+        keys=2,
+    ),
+    Case(
         "robots",
         "Arms of public URDF files with other inertias, moved by MuJoCo: errors beside the Cramer-Rao bound.",
         "robots",

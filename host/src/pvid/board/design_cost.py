@@ -11,8 +11,10 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
+from pvid.board.longest_tick import CORE, longest_tick
 from pvid.board.mechanism_board import refuse_unrefined
 from pvid.board.mechanism_image import (
+    MechanismRun,
     build_mechanism_image,
     identifier_of,
     long_run,
@@ -24,6 +26,7 @@ from pvid.board.mechanism_image_q31 import identifier_of as fixed_identifier_of
 from pvid.board.refined_image import RefinedRun, build_refined_image, light_work
 from pvid.board.replay_image import BLOCK
 from pvid.board.sizes import REFINED, WEAK, WITH_DMA, BuiltImage, Footprint, built_weak, figures_of, measured
+from pvid.board.tick_bound import TickBound
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_q31 import WeakQ31
@@ -91,6 +94,7 @@ class Cost:
     in_blocks : the weak form with samples in blocks of BLOCK: mean of a sample, longest of a block; None: both stages,
         or a board that is not in WITH_DMA
     refine : settings of the second stage; None: without
+    most : of a tick of the weak form, with samples that are spoilt as well; None: both stages, or no board with a CORE
     """
 
     asked: Asked
@@ -102,6 +106,7 @@ class Cost:
     equal: bool
     refine: RefineConfig | None = None
     in_blocks: Footprint | None = None
+    most: TickBound | None = None
 
     @property
     def shares(self) -> tuple[float, float] | None:
@@ -113,7 +118,7 @@ class Cost:
 
     def as_json(self) -> dict[str, Any]:
         """An entry of `cost` of `design --on --json`: as of `sizes --json`, and how it was measured."""
-        own, blocks = self.refine, self.in_blocks
+        own, blocks, most = self.refine, self.in_blocks, self.most
         shares = {} if self.shares is None else dict(zip(("mean_share", "longest_share"), self.shares, strict=True))
         return {
             "target": self.asked.board.name,
@@ -125,6 +130,7 @@ class Cost:
             "ticks": self.ticks,
             "first_s": self.first_s,
             **shares,
+            **({} if most is None else {"searched": most.longest, "bound": most.bound}),
             **({} if blocks is None else {"block": {"samples": BLOCK, "mean": blocks.mean, "longest": blocks.longest}}),
         }
 
@@ -217,7 +223,8 @@ def _in_float(
         if asked.board.name in WITH_DMA:
             image = built_weak(*build_mechanism_image(asked.board, run, blocks=True), run.name)
             blocks = image, identifier_of(run).run_in_blocks(run.samples, BLOCK)
-        return _measured(asked, run.name, built, record.hash, first, rate, blocks=blocks)
+        found = _measured(asked, run.name, built, record.hash, first, rate, blocks=blocks)
+        return replace(found, most=_most(asked, run))
     both = RefinedRun(run, refine_functions(compiled), refine)
     record_of_both = both.native().run_both(run.samples)
     first = _first(record_of_both.told)
@@ -241,7 +248,12 @@ def _in_fixed_point(asked: Asked, weak: WeakQ31, signals: Run) -> Cost:
     if asked.board.name in WITH_DMA:
         image = built_weak(*build_fixed_image(asked.board, run, blocks=True), run.name)
         blocks = image, fixed_identifier_of(run).run_in_blocks(run.counts, BLOCK)
-    return _measured(asked, run.name, built, record.hash, first, weak.sample_rate, blocks=blocks)
+    found = _measured(asked, run.name, built, record.hash, first, weak.sample_rate, blocks=blocks)
+    return replace(found, most=_most(asked, run))
+
+
+def _most(asked: Asked, run: MechanismRun | FixedRun) -> TickBound | None:
+    return longest_tick(asked.board, run) if asked.board.core == CORE else None
 
 
 def _most_ticks(board: Board, bytes_a_tick: int) -> int:

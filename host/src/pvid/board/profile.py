@@ -12,7 +12,7 @@ from pathlib import Path
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
 from pvid.board.refined_image import build_refined_image
-from pvid.board.replay_image import BLOCK, parse_report
+from pvid.board.replay_image import BLOCK, ReplayReport, parse_report
 from pvid.board.sizes import STANDARD, refined_replay
 from pvid.board.strong_image import build_image, measured_from, standard_run
 from pvid.board.weak_image import weak_image
@@ -65,6 +65,8 @@ def _symbols(board: Board, image: Path) -> list[_Symbol]:
 
 def _build_plugin() -> None:
     source = ROOT / "host" / "native" / "qemu_profile.c"
+    if not source.is_file():
+        raise PvidError("the instructions of functions are counted in a copy of pvid's repository, not in a package")
     with one_at_a_time(PLUGIN):
         if PLUGIN.exists() and PLUGIN.stat().st_mtime >= source.stat().st_mtime:
             return
@@ -128,14 +130,54 @@ def _weak(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
 _PLAYED = dict(zip(FORMS, (_weak, _strong), strict=True))
 
 
+@dataclass(frozen=True)
+class Counts:
+    """What the plugin counted of an image's calls of a function, and what the image reported.
+
+    Attributes
+    ----------
+    calls, longest : their number, and the instructions of the longest
+    enters : (place of an instruction, function that began behind it)
+    all, most : by place of an instruction, how often it was executed, and at most in one call of its function
+    report : of the image
+    """
+
+    calls: int
+    longest: int
+    enters: frozenset[tuple[int, int]]
+    all: dict[int, int]
+    most: dict[int, int]
+    report: ReplayReport
+
+    @classmethod
+    def of(cls, text: str, report: ReplayReport) -> Counts:
+        """From the plugin's file."""
+        rows = [line.split() for line in text.splitlines()]
+        numbers = {row[0]: int(row[1]) for row in rows[:2]}
+        enters = frozenset((int(row[1], 16), int(row[2], 16)) for row in rows[2:] if row[0] == "enters")
+        counts = [(int(row[0], 16), int(row[1]), int(row[2])) for row in rows[2:] if row[0] != "enters"]
+        every, most = {at: n for at, n, _ in counts}, {at: n for at, _, n in counts}
+        return cls(numbers["calls"], numbers["longest"], enters, every, most, report)
+
+
 def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profile:
+    found = counted(board, image, entry, measure_from)
+    return Profile(_by_function(found, _symbols(board, image)), found.report.instructions_mean)
+
+
+def counted(board: Board, image: Path, entry: str, measure_from: int = 0) -> Counts:
+    """Plays a replay image and counts the instructions of the calls of `entry`, from that of tick `measure_from` on.
+
+    Raises PvidError as `profile`.
+    """
     prepare_emulator(board)
     _build_plugin()
     symbols = _symbols(board, image)
     main = _named(symbols, "main")
     base = symbols[0].start
     with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "counts"
+        out, functions = Path(folder) / "counts", Path(folder) / "functions"
+        functions.write_text("\n".join(f"{one.start:x}" for one in symbols), encoding="ascii")
         settings = {
             "entry": _named(symbols, entry).start,
             "skip": measure_from,
@@ -143,6 +185,7 @@ def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profil
             "caller_end": main.start + main.size,
             "base": base,
             "bytes": symbols[-1].start + symbols[-1].size - base,
+            "functions": functions,
             "out": out,
         }
         plugin = ",".join([str(PLUGIN), *(f"{name}={value}" for name, value in settings.items())])
@@ -157,22 +200,18 @@ def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profil
             said = done.stderr.decode("utf-8", "replace").strip().splitlines()
             raise PvidError(f"{board.emulator} did not count: {said[-1] if said else 'it takes no plugins'}")
         counts = out.read_text(encoding="ascii")
-    report = parse_report(done.stdout.decode("ascii", "replace").replace("\r", ""))
-    return Profile(_by_function(counts, symbols), report.instructions_mean)
+    return Counts.of(counts, parse_report(done.stdout.decode("ascii", "replace").replace("\r", "")))
 
 
-def _by_function(counts: str, symbols: list[_Symbol]) -> dict[tuple[str, str], float]:
-    first, *lines = counts.splitlines()
-    calls = int(first.removeprefix("calls "))
+def _by_function(found: Counts, symbols: list[_Symbol]) -> dict[tuple[str, str], float]:
     total: Counter[tuple[str, str]] = Counter()
     remaining = iter(symbols)
     symbol = next(remaining)
-    for line in lines:  # by address, as the symbols are
-        address, count = int(line.split()[0], 16), int(line.split()[1])
+    for address, count in found.all.items():  # by address, as the symbols are
         while address >= symbol.start + symbol.size:
             symbol = next(remaining)
         total[symbol.name, symbol.file] += count
-    return {function: count / calls for function, count in total.most_common()}
+    return {function: count / found.calls for function, count in total.most_common()}
 
 
 def table_rows(profiles: dict[str, Profile]) -> list[tuple[str, ...]]:

@@ -36,7 +36,7 @@ class _Function:
     stored: int = 0  # a Cortex-M0: arguments of registers, in front of the frame that the compiler counts
 
 
-def _output(*command: str) -> str:
+def output_of(*command: str) -> str:
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
@@ -149,6 +149,13 @@ def _addresses(pointed: set[tuple[str, str]], placed: dict[tuple[str, str], int]
     return (found | {at for at, name in names.items() if name in elsewhere}) & names.keys()
 
 
+def pointed_to(tool_prefix: str, image: Path, tree: Path, names: dict[int, str]) -> set[int]:
+    """Where functions of these `names` begin that calls through a pointer may reach; image, tree as of stack_bound."""
+    compiled_in = [tree / "libpvid.a", *sorted((tree / "apps").rglob("*.o*"))]  # a model is beside the image's own
+    relocations = output_of(f"{tool_prefix}objdump", "-r", *map(str, compiled_in))
+    return _addresses(_pointed_to(relocations), _placed(image.with_suffix(".map").read_text(encoding="utf-8")), names)
+
+
 def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
     """Bytes of stack that `entry` and all it can call need at most.
 
@@ -161,11 +168,8 @@ def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
     image, tree : the linked image, with its map beside it, and the build tree with the compiler's records (*.su),
         libpvid.a and the image's objects
     """
-    functions = _functions(_output(f"{tool_prefix}objdump", "-d", str(image)))
-    compiled_in = [tree / "libpvid.a", *sorted((tree / "apps").rglob("*.o*"))]  # a model is beside the image's own
-    relocations = _output(f"{tool_prefix}objdump", "-r", *map(str, compiled_in))
-    placed = _placed(image.with_suffix(".map").read_text(encoding="utf-8"))
-    pointed = _addresses(_pointed_to(relocations), placed, {at: one.name for at, one in functions.items()})
+    functions = _functions(output_of(f"{tool_prefix}objdump", "-d", str(image)))
+    pointed = pointed_to(tool_prefix, image, tree, {at: one.name for at, one in functions.items()})
     frames = _frames(tree)
     is_avr = tool_prefix.startswith("avr")
     depth: dict[int, int] = {}

@@ -40,6 +40,11 @@ _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "am
 @click.option(
     "--ram", type=click.IntRange(1), help="Most RAM of the first stage [bytes]: fewer test functions if needed."
 )
+@click.option(
+    "--ticks",
+    type=click.IntRange(1),
+    help="Most instructions of a tick of the first stage on a Cortex-M4F, whatever the samples: the same.",
+)
 @force_option
 def command(
     model: str,
@@ -51,6 +56,7 @@ def command(
     core: Core,
     functions: int | None,
     ram: int | None,
+    ticks: int | None,
 ) -> int:
     """Writes MODEL with the tables of a rig as an Arduino, PlatformIO, ESP-IDF, Zephyr, CMake or CubeMX package.
 
@@ -73,9 +79,11 @@ def command(
     given += [f"--core {core}"] if core != _DEFAULT else []
     given += [f"--functions {functions}"] if functions is not None else []
     given += [f"--ram {ram}"] if ram is not None else []
+    given += [f"--ticks {ticks}"] if ticks is not None else []
     title = " ".join(["pvid deploy", Path(model).name, f"--for {target}", *given])
     is_integer = CORES[core] is FIXED
-    made = _within(ram, functions, _deployments(model, rig_path, run_path, columns, is_integer, title))
+    made_with = _deployments(model, rig_path, run_path, columns, is_integer, title)
+    made = _within(ram, ticks, functions, made_with)
     paths = write_package(made, target, out)
     if made.playback.held is not None:
         seconds = len(made.playback.counts) / made.sample_rate
@@ -87,29 +95,48 @@ def command(
     return DONE
 
 
-def _within(ram: int | None, functions: int | None, made_with: Callable[[int | None], Deployment]) -> Deployment:
-    """The deployment, with the most test functions whose first stage takes so many bytes at most."""
+def _within(
+    ram: int | None, ticks: int | None, functions: int | None, made_with: Callable[[int | None], Deployment]
+) -> Deployment:
+    """The deployment, with the most test functions that fit into so many bytes and instructions of a tick."""
     from pvid.deploy.memory import state_bytes
 
-    chosen = made_with(functions)
-    size = None if ram is None else state_bytes(chosen)
-    if ram is None or (size is not None and size <= ram):
+    def tried(number: int | None) -> tuple[Deployment, str]:
+        """The deployment, and what is too large of it."""
+        made = made_with(number) if ticks is None else made_with(number).with_ticks()
+        if ram is not None:
+            size = state_bytes(made)
+            if size is None:
+                raise PvidError("--ram needs a C compiler on this computer")
+            if size > ram:
+                return made, f"--ram {ram}: with the fewest test functions the first stage takes {size} bytes"
+        if ticks is not None and made.most is not None and made.most.bound > ticks:
+            return made, (
+                f"--ticks {ticks}: with the fewest test functions a tick takes up to {made.most.bound} instructions by "
+                f"its code, and {made.most.longest} in a search"
+            )
+        return made, ""
+
+    chosen, excess = tried(functions)
+    if not excess:
         return chosen
-    if size is None:
-        raise PvidError("--ram needs a C compiler on this computer")
     fits, least, most = None, 4, chosen.sizes["PVID_MAX_FUNCTIONS"] - 1
     while least <= most:
         middle = (least + most) // 2
-        tried = made_with(middle)
-        size = state_bytes(tried) or size
-        if size <= ram:
-            fits, least = tried, middle + 1
+        made, beyond = tried(middle)
+        if beyond:
+            most, excess = middle - 1, beyond
         else:
-            most = middle - 1
+            fits, least = made, middle + 1
     if fits is None:
-        raise PvidError(f"--ram {ram}: with the fewest test functions the first stage takes {size} bytes")
+        raise PvidError(excess)
     number, before = (one.sizes["PVID_MAX_FUNCTIONS"] for one in (fits, chosen))
-    write_stderr(f"note: {number} test functions in place of {before}, for {ram} bytes: the standard errors grow")
+    limits = [f"{ram} bytes"] if ram is not None else []
+    limits += [f"{ticks} instructions a tick"] if ticks is not None else []
+    what = " and ".join(limits)
+    write_stderr(f"note: {number} test functions in place of {before}, for {what}: the standard errors grow")
+    if chosen.is_refined and not fits.is_refined:
+        write_stderr("note: with them the second stage has no estimate of the recorded motion, which it has without")
     return fits
 
 

@@ -168,6 +168,11 @@ def _print_costs(costs: list[Cost]) -> None:
         what = "" if asked.board.toolchain == "avr" else ", one instruction a cycle"
         click.echo(f"%: of the {1000 / rate:.3g} ms between samples at {asked.clock_mhz:g} MHz{what}")
     for one in costs:
+        if one.most is not None:
+            click.echo(
+                f"longest tick of the weak form, whatever the samples: {one.most.bound} {unit} by its code, "
+                f"{one.most.longest} found by a search with spoilt samples"
+            )
         if one.in_blocks is not None:
             mean, longest = one.in_blocks.mean, one.in_blocks.longest
             click.echo(f"in blocks of {BLOCK} samples: {mean} {unit} a sample, {longest} in the longest block")
