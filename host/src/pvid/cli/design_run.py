@@ -170,7 +170,7 @@ def _print_costs(costs: list[Cost]) -> None:
     for one in costs:
         if one.most is not None:
             click.echo(
-                f"longest tick of the weak form, whatever the samples: {one.most.bound} {unit} by its code, "
+                f"longest tick of the first stage, whatever the samples: {one.most.bound} {unit} by its code, "
                 f"{one.most.longest} found by a search with spoilt samples"
             )
         if one.in_blocks is not None:
