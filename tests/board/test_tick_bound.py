@@ -9,7 +9,6 @@ from pvid.board.longest_tick import longest_tick
 from pvid.board.mechanism_image import mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.tick_bound import _Block, _functions, _longest_path, _loops
-from pvid.models.mechanisms import names
 from pvid.settings.enums import Core
 
 BOARD = BOARDS["mps2-an386"]
@@ -17,13 +16,12 @@ BOARD = BOARDS["mps2-an386"]
 
 @pytest.mark.by_day(2)
 @pytest.mark.parametrize("core", ["f32", "q31"])
-@pytest.mark.parametrize("name", ["kapitza", *(one for one in names() if one != "kapitza")])
+@pytest.mark.parametrize("name", ["kapitza", "dc_motor", "rigid_body", "two_mass_drive"])  # those of the table
 def test_no_tick_of_another_search_is_longer_than_the_bound(name: str, core: Core) -> None:
     """And no loop makes more passes in it: they depend on the design alone."""
     run = mechanism_run(name, long=True) if core == "f32" else fixed_run(name, long=True)
     found, other = longest_tick(BOARD, run), longest_tick(BOARD, run, seed=1)
     assert found.longest <= found.bound and other.longest <= found.bound
-    assert found.bound < 16 * found.longest
     more = {head: n for head, n in other.passes.items() if n > found.passes.get(head, n)}
     assert not more
 
@@ -31,7 +29,7 @@ def test_no_tick_of_another_search_is_longer_than_the_bound(name: str, core: Cor
 def test_the_bound_of_a_table_is_beyond_its_search() -> None:
     shown = results_of("ticks")
     columns = [list(map(int, shown.column(one))) for one in ("searched", "bound", "stack bound")]
-    assert all(0 < row[0] <= row[1] and row[2] > 0 for row in zip(*columns, strict=True))
+    assert all(0 < row[0] <= row[1] < 16 * row[0] and row[2] > 0 for row in zip(*columns, strict=True))
 
 
 def _of(blocks: dict[int, tuple[int, set[int], bool]]) -> dict[int, _Block]:

@@ -21,12 +21,11 @@ from program import pvid
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.boards import run as run_on
-from pvid.board.tick_bound import TickBound
 from pvid.cli.deploy import _within
 from pvid.configuration.refine import full_motion_of, refine_for_simulated_rig
 from pvid.configuration.weak import config_for_recording, config_for_simulated_rig, simulated_run_of
 from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_simulated_rig
-from pvid.deploy.deployment import Deployment
+from pvid.deploy.deployment import Deployment, Most
 from pvid.deploy.example import expected
 from pvid.deploy.of_rig import deployment_f32, deployment_q31
 from pvid.deploy.targets import TARGETS, write_package
@@ -401,9 +400,7 @@ def test_the_command_takes_the_largest_design_within_the_instructions_of_a_tick(
 
     def made(functions: int | None) -> Any:
         n = functions or 10
-        most = TickBound(50 * n, 20 * n, {}, {})
-        one = SimpleNamespace(sizes={"PVID_MAX_FUNCTIONS": n}, most=most, is_refined=n > 6)
-        return SimpleNamespace(with_ticks=lambda: one)
+        return SimpleNamespace(sizes={"PVID_MAX_FUNCTIONS": n}, most=Most(50 * n, 20 * n, 0), is_refined=n > 6)
 
     if number == 0:
         with pytest.raises(PvidError, match="a tick takes up to 200 instructions by its code, and 80 in a search"):
@@ -421,7 +418,7 @@ def test_a_readme_names_the_bounds_of_time_and_stack(motor: Deployment) -> None:
         return TARGETS["cmake"](one)["README.md"]
 
     assert "`pvid deploy --ticks N` bounds the instructions of a tick" in notes(motor)
-    known = notes(replace(motor, most=TickBound(1234, 567, {}, {}, 448)))
+    known = notes(replace(motor, most=Most(1234, 567, 448)))
     assert "at most 1234 instructions" in known and "took 567 in a search" in known and "at most 448 bytes" in known
 
 

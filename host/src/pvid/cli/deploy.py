@@ -82,7 +82,7 @@ def command(
     given += [f"--ticks {ticks}"] if ticks is not None else []
     title = " ".join(["pvid deploy", Path(model).name, f"--for {target}", *given])
     is_integer = CORES[core] is FIXED
-    made_with = _deployments(model, rig_path, run_path, columns, is_integer, title)
+    made_with = _deployments(model, rig_path, run_path, columns, is_integer, title, bounded=ticks is not None)
     made = _within(ram, ticks, functions, made_with)
     paths = write_package(made, target, out)
     if made.playback.held is not None:
@@ -103,7 +103,7 @@ def _within(
 
     def tried(number: int | None) -> tuple[Deployment, str]:
         """The deployment, and what is too large of it."""
-        made = made_with(number) if ticks is None else made_with(number).with_ticks()
+        made = made_with(number)
         if ram is not None:
             size = state_bytes(made)
             if size is None:
@@ -147,15 +147,33 @@ def _deployments(
     columns: str | None,
     is_integer: bool,
     title: str,
+    *,
+    bounded: bool,
 ) -> Callable[[int | None], Deployment]:
-    """The deployment by its number of test functions; None: chosen."""
+    """The deployment by its number of test functions, None: chosen; `bounded`: with the most that a tick takes."""
+    from pvid.board.boards import BOARDS
+    from pvid.board.longest_tick import longest_tick
+    from pvid.board.mechanism_image import MechanismRun, run_of_samples
+    from pvid.board.mechanism_image_q31 import FixedRun
     from pvid.codegen.weak_sizes import refuse_too_many_unknowns
     from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
-    from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
+    from pvid.configuration.weak import (
+        config_for_recording,
+        config_for_rig_like_the_shipped,
+        samples_of,
+        simulated_run_of,
+    )
     from pvid.configuration.weak_q31 import weak_q31_for_recording, weak_q31_for_rig_like_the_shipped
+    from pvid.deploy.deployment import Most
     from pvid.deploy.of_rig import deployment_f32, deployment_q31
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.oracle.weak.edges import with_edges
+
+    def with_most(made: Deployment, run: Callable[[], MechanismRun | FixedRun]) -> Deployment:
+        if not bounded:
+            return made
+        found = longest_tick(BOARDS["mps2-an386"], run())
+        return replace(made, most=Most(found.bound, found.longest, found.stack))
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     refuse_too_many_unknowns(compiled)
@@ -174,11 +192,13 @@ def _deployments(
         def of_recording(functions: int | None) -> Deployment:
             if is_integer:
                 weak = weak_q31_for_recording(compiled, recording, functions, found=found)
-                return replace(deployment_q31(weak, recording.signals, title), warnings=warnings)
+                made = replace(deployment_q31(weak, recording.signals, title), warnings=warnings)
+                return with_most(made, lambda: FixedRun(weak, weak.counts_of(recording.signals), 0))
             config = config_for_recording(compiled, recording, functions, reversals=signs, found=found)
             refine = _noted(lambda: refine_design(compiled, config, recording.signals))
             made = deployment_f32(compiled, config, recording.signals, title, refine, excitation)
-            return replace(made, warnings=warnings)
+            samples = samples_of(config, recording.signals)
+            return with_most(replace(made, warnings=warnings), lambda: run_of_samples(compiled, config, samples))
 
         return of_recording
     if model not in names_of_shipped():
@@ -187,10 +207,12 @@ def _deployments(
 
     def of_shipped_rig(functions: int | None) -> Deployment:
         if is_integer:
-            return deployment_q31(weak_q31_for_rig_like_the_shipped(compiled, functions), run, title)
+            weak = weak_q31_for_rig_like_the_shipped(compiled, functions)
+            return with_most(deployment_q31(weak, run, title), lambda: FixedRun(weak, weak.counts_of(run), 0))
         config = config_for_rig_like_the_shipped(compiled, functions)
         refine = _noted(lambda: refine_for_simulated_rig(compiled, config))
-        return deployment_f32(compiled, config, full_motion_of(compiled), title, refine)
+        made = deployment_f32(compiled, config, full_motion_of(compiled), title, refine)
+        return with_most(made, lambda: run_of_samples(compiled, config, samples_of(config, run)))
 
     return of_shipped_rig
 

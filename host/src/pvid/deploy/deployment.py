@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +12,6 @@ from pvid.configuration.excitation import Excitation
 from pvid.deploy.arithmetic import Arithmetic
 from pvid.settings.enums import Reason
 from pvid.twin.fnv import START, fold_bytes
-
-if TYPE_CHECKING:
-    from pvid.board.mechanism_image import MechanismRun
-    from pvid.board.mechanism_image_q31 import FixedRun
-    from pvid.board.tick_bound import TickBound
 
 Files = dict[str, str]
 
@@ -94,6 +88,21 @@ class SecondStage:
     held: Reason
 
 
+@dataclass(frozen=True)
+class Most:
+    """Of a tick on a Cortex-M4F.
+
+    Attributes
+    ----------
+    bound, longest : instructions by the code, and in a search with spoilt samples
+    stack : [bytes]
+    """
+
+    bound: int
+    longest: int
+    stack: int
+
+
 @dataclass(frozen=True, eq=False)
 class Deployment:
     """A mechanism for a rig.
@@ -115,8 +124,7 @@ class Deployment:
     excitation : of the commissioning; None: the package has none
     causes : of the shared errors, as of WeakConfig
     warnings : of the analysis of the recording that it is made for
-    replay : the motion as an image for a board plays it
-    most : instructions of a tick of the first stage; None: not asked for
+    most : of a tick of the first stage; None: not asked for
     """
 
     name: str
@@ -135,16 +143,7 @@ class Deployment:
     excitation: Excitation | None = None
     causes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    replay: MechanismRun | FixedRun | None = field(default=None, repr=False)
-    most: TickBound | None = None
-
-    def with_ticks(self) -> Deployment:
-        """With the bound of a tick. PvidError where the cross compiler or the emulator is missing."""
-        from pvid.board.boards import BOARDS
-        from pvid.board.longest_tick import longest_tick
-
-        assert self.replay is not None
-        return replace(self, most=longest_tick(BOARDS["mps2-an386"], self.replay))
+    most: Most | None = None
 
     @property
     def is_refined(self) -> bool:

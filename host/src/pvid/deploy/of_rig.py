@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.board.mechanism_image import run_of_samples
-from pvid.board.mechanism_image_q31 import FixedRun
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.files_weak_q31 import files_of, fitted_of
 from pvid.codegen.fitted_sizes import fitted_sizes
@@ -97,7 +95,6 @@ def deployment_f32(
         turning=_turning(made, config, resolution),
         excitation=excitation,
         causes=config.causes,
-        replay=run_of_samples(compiled, config, samples),
     )
 
 
@@ -131,7 +128,6 @@ def deployment_q31(weak: WeakQ31, run: Run, command: str) -> Deployment:
         first_s=weak.ticks_needed / weak.sample_rate,
         playback=_playback(counts, list(weak.lsb), record, design.hop * design.decimation, scale),
         causes=weak.config.causes,
-        replay=FixedRun(weak, weak.counts_of(run), 0),
     )
 
 
