@@ -108,7 +108,6 @@ CASES = (
         "ticks",
         ("ticks",),
         (click.Option(["--mechanism"], multiple=True, help="Only this one; may be given again. Default: all."),),
-        keys=2,
     ),
     Case(
         "robots",
