@@ -21,8 +21,12 @@ from typing import cast
 import pvid
 from pvid.cli.page_table import put_table, with_table
 from pvid.cli.verdict_table import verdict_table
+from pvid.codegen import files_strong
+from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.core.sources import FOLDERS, SRC
 from pvid.link import frames
+from pvid.model.strong import strong_form
+from pvid.models.mechanisms import compiled_of
 from pvid.oracle import paper
 from pvid.twin.printer import program
 
@@ -103,7 +107,18 @@ def paper_block() -> str:
     return f"```python\n{inspect.getsource(paper)}```"
 
 
-# page, marker, text
+def printed_block() -> str:
+    """The row and the solve of the pendulum's printed strong form, for paper.md."""
+    source = files_strong.source(renamed(strong_functions_of(strong_form(compiled_of("kapitza")))), "pvid model build")
+    parts = [
+        one
+        for name in ("atoms_of", "innovate", "force_of", "solved")
+        for one in source.split("\n\n")
+        if f" {name}(const" in one
+    ]
+    return "```c\n" + "\n\n".join(parts) + "\n```"
+
+
 def twin_block() -> str:
     """A module of the core and what is printed of it, for twin.md."""
     text = program.text_of([SRC / "judge" / "gate_f32.c"], FOLDERS, {})
@@ -112,8 +127,9 @@ def twin_block() -> str:
     return f"## C\n\n```c\n{c}\n```\n\n## Printed\n\n```python\n{printed}\n```"
 
 
-GENERATED = (
+GENERATED = (  # page, marker, text
     ("paper.md", "paper", paper_block),
+    ("paper.md", "printed", printed_block),
     ("twin.md", "twin", twin_block),
     ("link-and-log.md", "schema", schema_block),
     ("api-python.md", "api", python_reference),

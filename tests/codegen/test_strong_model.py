@@ -1,5 +1,6 @@
 """The printed strong form of every mechanism: the sums of the paper's equations, bits of C and twin, convergence."""
 
+import re
 import subprocess
 from dataclasses import replace
 from functools import cache
@@ -21,11 +22,11 @@ from pvid.codegen.strong_sums import StrongSums, chains_of, over, strong_sums_of
 from pvid.codegen.strong_twin import StrongModelTwin
 from pvid.core.sources import INCLUDES
 from pvid.design.fir import savitzky_golay
-from pvid.model import Model
 from pvid.model.operations import Program, evaluated
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
 from pvid.models import mechanisms
+from pvid.models.kapitza import paper_pendulum
 from pvid.settings.enums import Law, Reason, Status
 from pvid.settings.parts import EstimatorConfig, GateConfig
 from pvid.settings.strong import StrongModelConfig
@@ -380,24 +381,21 @@ def test_any_bits_as_samples_leave_finite_numbers_within_the_bounds(name: str) -
     assert Reason.UPDATED in record.reason
 
 
-def paper_pendulum() -> StrongFunctions:
-    """Kapitza's pendulum of the paper: no unknown zero, the pivot's acceleration is an input."""
-    model = Model("pendulum")
-    u = model.input("u", "1/s^2", hold="sampled", reach=30)
-    phi = model.sensor("phi", "rad", resolution=1e-3)
-    x, w = model.unmeasured("phi1", "rad"), model.unknown("w", "1/s^2", 31.67)
-    d1, d2 = model.unknown("d1", "", 8.875), model.unknown("d2", "", 5.625)
-    g = w + u
-    model.equation(x.d(2) + g * x - (d1 - d2 - 1) * g * phi)
-    model.equation(phi.d(2) - g * x + (d1 - 1) * g * phi)
-    return strong_functions_of(strong_form(model.compiled("pendulum")))
-
-
-def test_the_pendulums_sums_are_as_few_as_by_hand() -> None:
-    """58 sums, one multiplication each; the shift G = u + w is found."""
-    sums = strong_sums_of(renamed(paper_pendulum()))
+def test_the_papers_pendulum_has_sums_as_few_as_by_hand() -> None:
+    """58 sums, one multiplication each; the shift G = u + w is found, and its C is readable."""
+    strong = renamed(strong_functions_of(strong_form(paper_pendulum.model.compiled("paper_pendulum"))))
+    sums = strong_sums_of(strong)
     assert len(sums.places) == 58 and len(sums.chains) == 57 and sums.shift is not None
     assert sums.projection.operations <= 284
+    w, d1, d2, x0, phi, second, fourth, g = sp.symbols("w d1 d2 x0 phi phi_2 phi_4 G")
+    of_p = sp.Matrix([w * x0 + w**2 * fourth + d1 * g**3 * second + d2 * g**4 * phi])
+    printed = files_strong.source(strong, "test")
+    assert "With G = x1 + w:" in printed and "P[0] = d1 g[0][1] + d2 g[0][2] + phi_4*w**2 + w*x0" in printed
+    slopes = of_p.jacobian([w, d1, d2]) + sp.Matrix([[of_p.diff(g)[0], 0, 0]])
+    for a, (name, slope) in enumerate(zip(("w", "d1", "d2"), slopes, strict=True)):
+        (text,) = re.findall(rf"g\[0\]\[{a}\] = dP/d{name} = (.*)\n", printed)
+        assert sp.expand(sp.sympify(text) - slope) == 0
+    assert "/* sum G^7 phi^2 */" in printed and "/* S[0][2] */" in printed
 
 
 def test_chains_make_each_product_by_one_multiplication_of_known_ones() -> None:

@@ -30,7 +30,7 @@ KINDS = {"two": (4, 9), "three": (3, 5, 10), "uneven": (1, 9)}
 CONFIGS: dict[str, dict[Core, dict[str, Any]]] = {
     "plain": {"f32": {}, "q31": {}},
     "forgetting": {"f32": {"forgetting_s": 0.4}, "q31": {"forgetting_groups": 40}},  # folds after every second group
-    # g = 0.2: the innovation's gradient
+    # gamma = 0.2: the innovation's gradient
     "rate": {"f32": {"feedback_hz": 20.0, "forgetting_s": 1.0}, "q31": {"gain": ONE // 5, "forgetting_groups": 100}},
     "pseudovelocity": {"f32": {"law": Law.PSEUDOVELOCITY}, "q31": {"gain": 0}},
     "divider": {

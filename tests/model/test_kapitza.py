@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from pvid.model import Model
 from pvid.model.compiled import CompiledModel
 from pvid.model.strong import strong_form
+from pvid.models.kapitza.paper_pendulum import d1, d2, model, phi, u, w
 from pvid.models.mechanisms import compiled_of
 
 ORDER = ("d1", "d1*w", "d2", "d2*w", "d2*w**2", "c*d2", "c*d2*w", "c*d2*w**2")
@@ -35,13 +35,7 @@ def test_jacobian_has_sixteen_entries(compiled: CompiledModel) -> None:
 
 def test_strong_form_is_the_papers() -> None:
     """theory.md 2: 11 theta, 18 non-zeros of the Jacobian, Y and every regressor."""
-    model = Model("pendulum, encoder without offset")
-    u, phi = model.input("u", "1/s^2", hold="sampled"), model.sensor("phi", "rad", resolution=1e-4)
-    x = model.unmeasured("x", "rad")
-    w, d1, d2 = model.unknown("w", "1/s^2", 30.0), model.unknown("d1", "", 9.0), model.unknown("d2", "", 6.0)
-    model.equation(x.d(2) + (w + u) * x - (d1 - d2 - 1) * (w + u) * phi)
-    model.equation(phi.d(2) - (w + u) * x + (d1 - 1) * (w + u) * phi)
-    (row,) = strong_form(model.compiled()).rows
+    (row,) = strong_form(model.compiled("paper_pendulum")).rows
     y = u**2 * phi.d(4) - 2 * u * u.d() * phi.d(3) + (2 * u.d() ** 2 - u * u.d(2)) * phi.d(2)
     paper = {
         w: -2 * u * phi.d(4) + 2 * u.d() * phi.d(3) + u.d(2) * phi.d(2),

@@ -50,7 +50,8 @@ static void test_a_step_with_its_return_is_newton_s(void **state)
     assert_false(pvid_constraints_return_f32(&of_circle, &settings, p, 2));
 }
 
-/* With dp = n + C pi the projected equations are those of pi: C^T (S dp - F) = 0 and A dp = -g, whatever the pivots. */
+/* With dp = back + T z the projected equations are those of z: T^T (S dp - F) = 0 and A dp = -h, whatever the pivots.
+ */
 static void test_the_projected_equations_give_the_constrained_least_squares(void **state)
 {
     const float p[3] = {3.0f, 4.5f, 2.9f};

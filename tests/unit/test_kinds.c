@@ -281,7 +281,7 @@ static void a_vector_is_added_to_b_or_refused(void **state)
         for (size_t i = 0; i < N_THETA; i++) {
             assert_true(b_of(&estimator, i) == fits[i]);
         }
-        /* C^T g at p = 1.5: the step of a law with g < 1 takes it like N e of a row */
+        /* C^T g at p = 1.5: the step of a law with gamma < 1 takes it like N e of a row */
         assert_true(estimator.innovation[1] ==
                     ((law == 0) ? 0.0f : ((-2.0f + (1.5f * 3.0f)) - 4.0f) + (1.5f * -1.0e28f)));
         const pvid_estimator_f32 before = estimator;

@@ -246,7 +246,7 @@
 #endif
 
 /* Parts that a design or its settings may not need; 0 leaves a part out, for less flash. `pvid model build` prints
- * them. init refuses settings that need a part that is left out: a dead zone with PVID_BAD_DEAD_ZONE, g < 1 with
+ * them. init refuses settings that need a part that is left out: a dead zone with PVID_BAD_DEAD_ZONE, gamma < 1 with
  * PVID_BAD_FEEDBACK, shared errors with PVID_BAD_SHARED, a second stage with PVID_BAD_POINTER. */
 #ifndef PVID_DEAD_ZONE /* dead zone of estimator.h */
 #define PVID_DEAD_ZONE 1
@@ -254,7 +254,7 @@
 #if PVID_DEAD_ZONE != 0 && PVID_DEAD_ZONE != 1
 #error "PVID_DEAD_ZONE must be 0 or 1"
 #endif
-#ifndef PVID_FEEDBACK /* laws of the weak form with g < 1 (estimator.h) */
+#ifndef PVID_FEEDBACK /* laws of the weak form with gamma < 1 (estimator.h) */
 #define PVID_FEEDBACK 1
 #endif
 #if PVID_FEEDBACK != 0 && PVID_FEEDBACK != 1

@@ -1,13 +1,13 @@
 /* pvid/estimator.h - estimates few parameters p from rows Y = N^T theta(p) + noise.
  *
- * Adds rows (Y, N) of a model to sums and takes damped Gauss-Newton steps on them (theory.md 4, equation
- * (5)):
+ * Adds rows (Y, N) of a model to sums and takes damped Gauss-Newton steps on them (theory.md 4, (5)
+ * and (6)):
  *
  *   M = sum N N^T,   B = sum N Y,   S = C^T M C,   F = C^T (B - M theta),   C = d theta / d p
- *   (S + H0) dp = (1 - g) sum C^T N e + g F,   p += dp,   e = Y - N^T theta
+ *   (S + H0) dp = (1 - gamma) sum C^T N e + gamma F,   p += dp,   e = Y - N^T theta
  *
- * g = 0 is the paper's law; g = 1 is a Gauss-Newton step on the sums. H0 is the prior information of the initial
- * guess. A Cholesky factorisation of order n_p solves the system.
+ * gamma = 0 is the paper's law; gamma = 1 is a Gauss-Newton step on the sums. H0 = (row_sd / start_sd)^2 is then
+ * damping alone, with gamma = 0 the information of the start. A Cholesky factorisation of order n_p solves the system.
  *
  *   static pvid_estimator_f32 estimator;
  *   pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;   (then model, start, ...)
@@ -25,13 +25,13 @@
  *
  * This is the relative dead zone of adaptive control, applied to the normalised residual of the sums instead of
  * the last innovation: B and M are sufficient statistics, and a zone on single innovations would stop p one row's
- * noise away from the solution. Rows are added in any case; F keeps their effect for a later step, but (1 - g) sum
- * C^T N e is dropped. Standard errors do not include the zone. With g = 0 F does not decay, and p may never enter
+ * noise away from the solution. Rows are added in any case; F keeps their effect for a later step, but (1 - gamma) sum
+ * C^T N e is dropped. Standard errors do not include the zone. With gamma = 0 F does not decay, and p may never enter
  * the zone.
  *
- * Storage of B. A model with its own `project` stores B = sum N Y. For other models b = B - M theta and rr = sum
- * (Y - N^T theta)^2 are stored and updated by b -= M dtheta at every step. This avoids cancellation: the residual
- * variance is accurate in float32 even if the residual is 1e-4 of Y.
+ * Storage of B. In its place b = B - M theta, and rr = sum (Y - N^T theta)^2, are stored and updated by b -= M dtheta
+ * at every step. This avoids cancellation: the residual variance is accurate in float32 even if the residual is 1e-4 of
+ * Y.
  */
 #ifndef PVID_ESTIMATOR_H
 #define PVID_ESTIMATOR_H
@@ -58,13 +58,12 @@ typedef struct {
     float row_sd;         /* expected standard deviation of Y - N^T theta [units of Y], > 0 */
     float update_rate_hz; /* groups of rows per second [Hz], 1e-6..1e6 */
     float forgetting_s;   /* time constant of forgetting [s], at least 4 groups; 0: no forgetting */
-    float feedback_hz;    /* stationary law: g = feedback_hz * time between solves, at most 1 [Hz]; 0: g = 1 */
+    float feedback_hz;    /* stationary law: gamma = feedback_hz * time between solves, at most 1 [Hz]; 0: gamma = 1 */
     float correlation;    /* rows per independent row, >= 1: widens the standard errors where filters overlap */
-    float row_weight; /* independent rows per row, 0 < . <= 1: (K - 2)/K for K rows without 2 degrees of freedom; 1 for
-                         models with their own accumulate */
-    float step_limit; /* largest |dp/p| of a step (|dp|/start_sd for parameters that may be zero), 0 < . <= 0.9 */
-    float kappa_min;  /* no step while kappa of S + H0 is smaller, or p[0] has less information from the data than from
-                         the start, 0..1; 0: always step */
+    float row_weight;     /* independent rows per row, 0 < . <= 1: (K - 2)/K for K rows without 2 degrees of freedom */
+    float step_limit;     /* largest |dp/p| of a step (|dp|/start_sd for parameters that may be zero), 0 < . <= 0.9 */
+    float kappa_min; /* no step while kappa of S + H0 is smaller, or p[0] has less information from the data than from
+                        the start, 0..1; 0: always step */
     float noise_margin; /* no step while S contains less than this many times the information of noise of row_sd alone,
                            0..1e6; in the weak form alone (weak.h); 0: no check */
     float dead_zone;    /* no step within this many standard errors of the solution, 0..100; 0: no dead zone */
@@ -72,7 +71,7 @@ typedef struct {
     uint16_t divider; /* groups of rows per solve, 1..65535 */
 } pvid_estimator_config_f32;
 
-/* Defaults: stationary law, g = 1, solve after every group, no forgetting, correlation 1, row_weight 1, step_limit
+/* Defaults: stationary law, gamma = 1, solve after every group, no forgetting, correlation 1, row_weight 1, step_limit
  * 0.3, kappa_min 1e-5, noise_margin 16, no dead zone. Copy, then set model, start, start_sd, lower, upper, row_sd
  * and update_rate_hz. */
 extern const pvid_estimator_config_f32 pvid_estimator_defaults_f32;
@@ -121,9 +120,8 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
  * such kind: PVID_NOT_READY. */
 pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y);
 
-/* Adds g[n_theta] to b (of a model with its own `project` to B), the theta of all kinds at once: compensates the error
- * that noise in N causes in sum N e. While g < 1 the step takes it as it takes the rows of the group. Returns
- * PVID_ACCUMULATED. Fails iff
+/* Adds g[n_theta] to b, the theta of all kinds at once: compensates the error that noise in N causes in sum N e. While
+ * gamma < 1 the step takes it as it takes the rows of the group. Returns PVID_ACCUMULATED. Fails iff
  *   - g is not finite: PVID_REJECTED_NOT_FINITE, or
  *   - |g_i| exceeds PVID_ROW_LIMIT^2: PVID_REJECTED_SATURATED.
  * A failure changes nothing but the counter. */
@@ -143,7 +141,7 @@ pvid_reason pvid_estimator_iterate_f32(pvid_estimator_f32 *self);
  *
  * advance returns true when the solve is complete. The bits equal those of update if no row is added in between.
  * Number and cost of the stages do not depend on the data. One stage moves p, theta, b and rr; the last folds the
- * sums. A model with its own `project` is solved in one stage. */
+ * sums. */
 void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group);
 bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);
 
@@ -157,8 +155,8 @@ void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[]);
  * residual sum / (weight - n_p). Changes nothing. Cost: about two solves. */
 void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32 *estimate);
 
-/* The same in stages, for a model without its own `project`: begin_assessment, then assess_advance until it
- * returns true. `estimate` must stay valid until then. */
+/* The same in stages: begin_assessment, then assess_advance until it returns true. `estimate` must stay valid until
+ * then. */
 void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
                                          pvid_estimate_f32 *estimate);
 bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve);

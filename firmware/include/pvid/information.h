@@ -18,8 +18,8 @@
 extern "C" {
 #endif
 
-/* Layout of the sums: n_moments of M, block by block (model.h), n_theta of B, yy, weight. For a model without its own
- * `project` b and rr take the places of B and yy (estimator.h). */
+/* Layout of the sums: n_moments of M, block by block (model.h), n_theta of B, yy, weight. In an estimator b and rr take
+ * the places of B and yy (estimator.h). */
 #define PVID_MAX_SUMS (PVID_MAX_MOMENTS + PVID_MAX_THETA + 2)
 
 /* Limit of the root of a row's sum of squares: 2^32 such rows fit into float32. */
@@ -33,8 +33,7 @@ typedef struct pvid_information_f32 pvid_information_f32;
 void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model, float forgetting_groups);
 
 /* Adds a row within PVID_ROW_LIMIT and writes the new values of the sums, as pvid_information_read_f32 does. sums
- * may be NULL for a model without its own accumulate. A model of several kinds takes it as a row of kind 0. Cost: one
- * product and two additions per sum. */
+ * may be NULL. A model of several kinds takes it as a row of kind 0. Cost: one product and two additions per sum. */
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS]);
 

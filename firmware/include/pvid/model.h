@@ -16,12 +16,11 @@
  * M then has a block for each kind and no entries between them. C has all theta: a parameter may occur in several
  * kinds. Every row has the same variance, so rows of different units are divided by their standard deviations.
  *
- * Constraints. g(p) = 0 of parameters that nobody has solved for some of them (PVID_MAX_CONSTRAINTS > 0): a function
- * writes g and its gradient of each. init moves the start to g = 0, and every step stays there: theory.md 4.
+ * Constraints. h(p) = 0 of parameters that nobody has solved for some of them (PVID_MAX_CONSTRAINTS > 0): a function
+ * writes h and its gradient of each. init moves the start to h = 0, and every step stays there: theory.md 4, (6b).
  *
  * Drifts. Directions in which alone parameters change in time, as with a temperature (PVID_MAX_DRIFTS > 0): what older
- * rows tell along them is forgotten, and nothing else.
- *
+ * rows of each kind tell along them is forgotten: theory.md 4, (6d).
  */
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
@@ -58,8 +57,8 @@ struct pvid_model_f32 {
     void (*jacobian)(const float p[], float c[]);
 #if PVID_MAX_CONSTRAINTS > 0
     uint8_t n_constraints; /* 0..PVID_MAX_CONSTRAINTS, fewer than n_p; n_p <= n_theta + n_constraints */
-    /* g[n_constraints][1 + n_p] = each constraint at p, then d / dp of it; NULL without constraints */
-    void (*constraints)(const float p[], float g[]);
+    /* h[n_constraints][1 + n_p] = each constraint at p, then d / dp of it; NULL without constraints */
+    void (*constraints)(const float p[], float h[]);
 #endif
 #if PVID_MAX_DRIFTS > 0
     uint8_t n_drifts;       /* 0..PVID_MAX_DRIFTS; without forgetting along them all parameters are constant */

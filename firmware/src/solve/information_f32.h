@@ -17,7 +17,7 @@ static inline void pvid_information_block_f32(const pvid_model_f32 *model, size_
     }
 }
 
-/* Adds a row of the kind with this block: n[block->n]. For models without their own accumulate. Cost: one product and
+/* Adds a row of the kind with this block: n[block->n]. Cost: one product and
  * one addition per sum of the kind. */
 void pvid_information_add_block_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const pvid_block *block,
                                     const float n[], float y);

@@ -24,7 +24,7 @@ pvid_status pvid_settings_within_f32(const float values[], const pvid_range_f32 
 pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive,
                                         float update_rate_hz);
 
-/* g of estimator.h for solves at this interval [groups of rows]. */
+/* gamma of estimator.h for solves at this interval [groups of rows]. */
 float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float update_rate_hz, float interval);
 
 /* exp(-x), 0 <= x <= 4: the core has no libm but sqrtf. */

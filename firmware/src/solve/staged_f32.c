@@ -48,7 +48,7 @@ enum {
 
 /* ---- rows ---- */
 
-/* e = y - N^T theta and, while g < 1, gradient = C^T N, by theta and the pattern of C, for a row of this block. */
+/* e = y - N^T theta and, while gamma < 1, gradient = C^T N, by theta and the pattern of C, for a row of this block. */
 static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *block, const float n[], float y,
                              float gradient[])
 {
@@ -369,7 +369,7 @@ PVID_COLD void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator
         solve->gain = self->settings.gain;
         solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_READ : STAGE_FOLD);
     } else if (pvid_feeds_back_f32(self)) {
-        solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
+        solve->stage = STAGE_DONE; /* with gamma < 1 there is one step per group */
     }
 }
 

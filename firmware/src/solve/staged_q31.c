@@ -68,7 +68,8 @@ PVID_COLD static void project_fresh(const pvid_estimator_q31 *self, pvid_estimat
     }
 }
 
-/* Right-hand side of the step by rows of C, g b + (1 - g) sum N e since the last solve, scaled as these rows. */
+/* Right-hand side of the step by rows of C, gamma b + (1 - gamma) sum N e since the last solve, scaled as these rows.
+ */
 static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const size_t n = self->model->n_theta;
@@ -445,7 +446,7 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
         solve->gain = self->settings.gain;
         solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_MATRIX : STAGE_FOLD);
     } else if (self->settings.gain < PVID_ONE_Q30) {
-        solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
+        solve->stage = STAGE_DONE; /* with gamma < 1 there is one step per group */
     }
 }
 

@@ -13,7 +13,7 @@ static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
     return ((model->positive >> i) & 1u) != 0u;
 }
 
-/* Returns whether a step takes sum C^T N e of its rows beside the sums: g < 1. */
+/* Returns whether a step takes sum C^T N e of its rows beside the sums: gamma < 1. */
 static inline bool pvid_feeds_back_f32(const pvid_estimator_f32 *self)
 {
     return (PVID_FEEDBACK != 0) && (self->settings.gain < 1.0f);

@@ -687,8 +687,8 @@ PVID_ALWAYS_INLINE pvid_reason solve(strong_estimator_f32 *self, const float rhs
 }
 #endif
 
-/* S and the right-hand side at p from all rows and this one: rhs = g F + (1 - g) rhs, where rhs is the sum of C^T N e
- * of the rows since the last projection. The square of this row is not in S yet. */
+/* S and the right-hand side at p from all rows and this one: rhs = gamma F + (1 - gamma) rhs, where rhs is the sum of
+ * C^T N e of the rows since the last projection. The square of this row is not in S yet. */
 static inline void project_all(strong_estimator_f32 *self, const strong_gradient_f32 *row, float rhs[STRONG_P])
 {
     float force[STRONG_P];

@@ -2,14 +2,14 @@
 
 #include "number/short_loops.h"
 
-/* s = C^T (sum N e + g) is a window's score at the p before its steps. With S^-1 = V a step is V sum s, so that its
- * variance over so many windows in the sums is
+/* C^T (sum N e + g) is a window's score at the p before its steps; g compensates noise in N. With S^-1 = V a step is V
+ * times the sum of scores, so that its variance over so many windows in the sums is, theory.md 4, (7a),
  *
- *   windows V G V,   G the mean of s s^T, or of that and s s_before^T + s_before s^T, whichever gives more:
+ *   windows V Gamma V,   Gamma the mean of score score^T, or of that and of score before^T + before score^T,
  *
- * neighbours share half of their samples. A mean gives the newest window the weight 2/(k + 2), k windows before it, but
- * not less than forgetting does. The first windows, at a poor p, say nothing of the scatter at a good one: the means
- * begin anew with a window whose residuals are far below their mean. */
+ * whichever gives more: neighbours share half of their samples. A mean gives the newest window the weight 2/(k + 2), k
+ * windows before it, but not less than forgetting does. The first windows, at a poor p, say nothing of the scatter at a
+ * good one: the means begin anew with a window whose residuals are far below their mean. */
 #include "weak/scores_f32.h"
 
 #include <string.h>

@@ -40,7 +40,7 @@ typedef struct {
 
 /* The normal equations of a solve and the residuals at p, gathered from the sums (estimator.h):
  *
- *   (S + H0) dp = g F + (1 - g) sum C^T N e,   S = C^T M C,   F = C^T (B - M theta) */
+ *   (S + H0) dp = gamma F + (1 - gamma) sum C^T N e,   S = C^T M C,   F = C^T (B - M theta) */
 typedef struct {
     float s[PVID_MAX_P][PVID_MAX_P]; /* S [n_p][n_p], for a step S + H0; upper triangle */
     float force[PVID_MAX_P];         /* F [n_p] */
@@ -60,7 +60,7 @@ struct pvid_estimator_f32 {
     float p[PVID_MAX_P];
     float theta[PVID_MAX_THETA]; /* f(p) */
 #if PVID_FEEDBACK
-    float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
+    float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while gamma < 1 */
 #endif
     pvid_solve_settings_f32 settings;
     float group_rss;    /* sum of e^2 of the rows of the current group, each at the p of its tick */
@@ -112,7 +112,7 @@ struct pvid_estimator_solve_f32 {
     bool ends_group;
     bool in_dead_zone;  /* within the dead zone: no step is taken */
     pvid_p_bits pinned; /* bit a: p[a] stays at its bound */
-    float gain;         /* g of this solve */
+    float gain;         /* gamma of this solve */
     float fall;         /* decrease of rr by the step */
     float scale;        /* sum of M_ii dtheta_i^2: size of the terms that cancel in `fall` */
     float sums[PVID_MAX_SUMS];

@@ -10,7 +10,7 @@ struct pvid_information_f32 {
     uint16_t block;   /* groups of rows between folds, 1.. */
     uint16_t age;     /* groups since the last fold, 0..block-1 */
     float retention;  /* factor on the past at a fold, in (0, 1]; 1 keeps everything */
-    float row_weight; /* weight of a row; 1 for a model with its own accumulate */
+    float row_weight; /* weight of a row */
     float rounding;   /* bound of the rounding error of rr, which every step of p changes (estimator.h); fades with the
                          sums [units of yy] */
     float high[PVID_MAX_SUMS];

@@ -40,13 +40,10 @@ class Language:
 
 def statements(program: Program, language: Language) -> tuple[list[str], list[str]]:
     """The statements, and the text of each result."""
-    prefix = temporary_prefix(program.arguments)
     texts: list[str] = []
     lines: list[str] = []
-    for place, value in enumerate(program.values):
-        name = f"{prefix}{place}"
+    for place, (name, value) in enumerate(zip(names_of(program), program.values, strict=True)):
         if isinstance(value, Argument):
-            name = program.arguments[value.place]
             text = language.argument(value.place)
         elif isinstance(value, Literal):
             text = language.literal(place)
@@ -58,6 +55,15 @@ def statements(program: Program, language: Language) -> tuple[list[str], list[st
         lines.append(language.statement(name, text))
         texts.append(name)
     return lines, [texts[place] for place in program.results]
+
+
+def names_of(program: Program) -> list[str]:
+    """Of each value, in its statement."""
+    prefix = temporary_prefix(program.arguments)
+    return [
+        program.arguments[value.place] if isinstance(value, Argument) else f"{prefix}{place}"
+        for place, value in enumerate(program.values)
+    ]
 
 
 def call_of(program: Program, place: int, operands: list[str], calls: Mapping[str, str]) -> str:

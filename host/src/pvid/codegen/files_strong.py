@@ -14,8 +14,8 @@ from pvid.codegen.c_text import UNCONTRACTED, banner, c_comment, for_cpp, guarde
 from pvid.codegen.functions import Function
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
-from pvid.codegen.strong_sums import Monomial, StrongSums, strong_sums_of, text_of
-from pvid.model.operations import Program, exact
+from pvid.codegen.strong_sums import Monomial, Noted, StrongSums, strong_sums_of, text_of
+from pvid.model.operations import exact
 
 _HEADER = """\
 /* Settings. They must outlive the identifier, unchanged. */
@@ -54,7 +54,7 @@ typedef struct {{
     float prior[{upper}_P];  /* diagonal of H0 */
     float weight[{upper}_KINDS]; /* of each kind, relative to the first */
     float row_sd;            /* of the first kind, in units of the core's rows */
-    float gain;              /* g of a step with an exact projection */
+    float gain;              /* gamma of a step with an exact projection */
     float retention;         /* factor on the past at a fold, in (0, 1] */
     uint16_t phase;          /* rows since the last projection */
     uint8_t exact_every;
@@ -197,9 +197,9 @@ def header(strong: StrongFunctions, command: str) -> str:
         f"  if ({name}_init_f32(&identifier, &config) != PVID_OK) ...",
         f"  each tick: {name}_step_f32(&identifier, sample); identifier.estimator.p is the estimate",
         "",
-        "How often p is solved for: divider 1, exact_every 1: S and F from all sums at every row, the paper's law (5)",
-        "literally; divider 1: a step at every row, from all sums at every eighth; divider 8, 12 .. 64: projection,",
-        "solve and folding of the sums at rows of their own, the least work of a tick; other dividers: all at one row.",
+        "How often p is solved for: divider 1: a step at every row, from all sums at every exact_every-th (by default",
+        "every eighth); divider 8, 12 .. 64: projection, solve and folding of the sums at rows of their own, the least",
+        "work of a tick; other dividers: all at one row. The paper's law (5) is pseudovelocity with divider 1.",
         "",
         "Samples:",
         *describe.table(samples),
@@ -298,6 +298,7 @@ def _names(strong: StrongFunctions, sums: StrongSums) -> str:
             f"#define STRONG_HELD {int(any(strong.held))}",
             f"#define STRONG_CONSTRAINTS {len(strong.functions.model.constraints)}",
             f"#define STRONG_HELD_CHANNELS {{{held}}}",
+            "/* rows below are those of the header times these */",
             f"#define STRONG_UNITS {{{units}}}",
             f"#define STRONG_LINEAR {{{linear}}}",
             f"#define STRONG_LINEAR_COUNT {len(sums.linear)}u",
@@ -305,7 +306,7 @@ def _names(strong: StrongFunctions, sums: StrongSums) -> str:
             *(f"typedef {name}_{one}_f32 strong_{one}_f32;" for one in ("config", "window", "estimator")),
             f"typedef {name}_f32 strong_f32;",
             "",
-            "/* Residual e and gradient C^T N of a row of each kind. */",
+            "/* Residual e = Y - N^T theta and gradient g = C^T N of a row of each kind. */",
             "typedef struct {",
             "    float e[STRONG_KINDS];",
             "    float g[STRONG_KINDS][STRONG_P];",
@@ -350,7 +351,7 @@ def _inputs(strong: StrongFunctions) -> list[str]:
 
 def _rows(sums: StrongSums) -> list[str]:
     innovation = sums.innovation
-    lines, results = _printed(innovation.program)
+    lines, results = _printed(innovation.noted)
     at = iter(results)
     entries: list[str] = []
     squares: list[str] = []
@@ -368,7 +369,7 @@ def _rows(sums: StrongSums) -> list[str]:
             g = f"(weight[{k}] * {names[a]})" if k else names[a]
             forces[a].append(f"({g} * row->e[{k}])")
     force = [f"force[{a}] = {' + '.join(terms) or '0.0f'};" for a, terms in forces.items()]
-    bound, (limited,) = _printed(sums.bound)
+    bound, (limited,) = _printed(Noted(sums.bound, {}))
     several = len(sums.kinds) > 1
     unused = [] if several else ["(void)weight;"]
     kinds = range(len(sums.kinds))
@@ -379,7 +380,7 @@ def _rows(sums: StrongSums) -> list[str]:
     unit = "p[0] * " if sums.strong.functions.model.unknowns[0].positive else ""
     parts = [f"const float r{k} = {unit}row->g[{k}][0];" for k in sensitive]
     signal = " + ".join(f"(weight[{k}] * (r{k} * r{k}))" if k else f"(r{k} * r{k})" for k in sensitive) or "0.0f"
-    atoms, atom_results = _printed(sums.atoms_program)
+    atoms, atom_results = _printed(Noted(sums.atoms_program, {}))
     listed = "; ".join(f"x[{k}] = {one}" for k, one in enumerate(sums.atoms))
     return [
         _commented(
@@ -397,7 +398,14 @@ def _rows(sums: StrongSums) -> list[str]:
             ),
         ),
         _commented(
-            f"Residual and gradient of the rows, theory.md (5). {innovation.program.cost}.",
+            [
+                "e = Y - P and g of each kind of row, for theory.md (5). P = N^T theta is (2), g = dP/dp = C^T N with C"
+                " of (4); each term of P, in powers of x and p, is an entry of N times its theta. z_2 is the second"
+                " derivative of a signal z.",
+                *([f"With {sums.shift_text}:"] if sums.shift_text else []),
+                *(f"  {line}" for k in kinds for line in sums.about(k)),
+                f"{innovation.program.cost}.",
+            ],
             c_functions.definition(
                 "static inline void innovate(const float p[STRONG_P], const float x[STRONG_ATOMS],"
                 " strong_gradient_f32 *row)",
@@ -413,7 +421,7 @@ def _rows(sums: StrongSums) -> list[str]:
             ),
         ),
         _commented(
-            "C^T N e.",
+            "C^T N e, the right-hand side of (5).",
             c_functions.definition(
                 "static inline void force_of(const strong_gradient_f32 *row, const float weight[STRONG_KINDS],"
                 " float force[STRONG_P])",
@@ -440,13 +448,13 @@ def _rows(sums: StrongSums) -> list[str]:
 
 def _equations(sums: StrongSums) -> list[str]:
     n_p = len(sums.p)
-    lines, results = _printed(sums.projection)
+    lines, results = _printed(sums.noted_projection)
     triangle = n_p * (n_p + 1) // 2
     projected = [f"s[{k}] = {one};" for k, one in enumerate(results[:triangle])]
     projected += [f"force[{a}] = {one};" for a, one in enumerate(results[triangle:])]
     arguments = "const float high[STRONG_SUMS], const float low[STRONG_SUMS], const float p[STRONG_P],"
     arguments += " const float weight[STRONG_KINDS]"
-    distance, (apart,) = _printed(sums.distance)
+    distance, (apart,) = _printed(Noted(sums.distance, {}))
     signature = "static PVID_NOINLINE void add_rows(const float block[restrict][STRONG_ATOMS],"
     signature += " float low[restrict STRONG_SUMS])"
     return [
@@ -455,21 +463,23 @@ def _equations(sums: StrongSums) -> list[str]:
             c_functions.definition(signature, _added_products(sums)),
         ),
         _commented(
-            f"S = C^T M C and F = C^T (B - M theta) at p, theory.md (4) and (5). {sums.projection.cost}.",
+            "S = C^T M C of theory.md (5) and F = C^T (B - M theta) of (6) at p: sums of g g^T and g e."
+            f" {sums.projection.cost}.",
             c_functions.definition(
                 f"PVID_ALWAYS_INLINE void project({arguments}, float s[STRONG_S], float force[STRONG_P])",
                 [*_unused(lines, ("p", "weight")), *lines, *projected],
             ),
         ),
         _commented(
-            "The sum of (Y - Q)^2.",
+            "The sum of (Y - Q)^2, Q the part of P behind its terms p g.",
             c_functions.definition(
                 f"static PVID_COLD float distance({arguments})",
                 [*_unused(distance, ("high", "low", "p", "weight")), *distance, f"return {apart};"],
             ),
         ),
         _commented(
-            "dp = (S + H0)^-1 rhs by L D L^T from the last row up. Fails iff a pivot is below PVID_PIVOT_MIN of its"
+            "dp = (S + H0)^-1 rhs, theory.md (5) and (6), by L D L^T from the last row up: d is the diagonal,"
+            " v are the pivots. Fails iff a pivot is below PVID_PIVOT_MIN of its"
             " diagonal (PVID_HELD_SINGULAR), or p[0] is not sufficiently excited (PVID_HELD_NOT_EXCITED).",
             c_functions.definition(
                 "PVID_ALWAYS_INLINE pvid_reason solved(const float s[STRONG_S], const float prior[STRONG_P],"
@@ -507,7 +517,7 @@ def _constraints(strong: StrongFunctions) -> list[str]:
     count = len(strong.functions.model.constraints)
     return [
         _commented(
-            f"Each constraint g(p) = 0 and its derivatives by p, theory.md (6b): {'; '.join(function.labels)}.",
+            f"Each constraint h(p) = 0 and its derivatives by p, theory.md (6b): {'; '.join(function.labels)}.",
             c_functions.float_function(signature, function.program),
         ),
         "static const pvid_model_f32 tied = {"
@@ -602,10 +612,13 @@ def _argument(name: str) -> str:
     return _ARRAYS[stem].format(name.removeprefix(stem))
 
 
-def _printed(program: Program) -> tuple[list[str], list[str]]:
+def _printed(noted: Noted) -> tuple[list[str], list[str]]:
     """The statements of a program whose arguments are places of arrays, and its results."""
+    program = noted.program
+    names = c_functions.names_of(program)
+    notes = {names[place]: f" /* {text} */" for place, text in noted.notes.items()}
     language = Language(
-        statement=lambda name, text: f"const float {name} = {text};",
+        statement=lambda name, text: f"const float {name} = {text};{notes.get(name, '')}",
         argument=lambda place: _argument(program.arguments[place]),
         literal=lambda place: c_literal(program.literal(place)),
         operation=lambda place, operands: call_of(program, place, operands, c_functions.FLOAT_CALLS),
@@ -619,5 +632,5 @@ def _unused(lines: Sequence[str], arrays: Sequence[str]) -> list[str]:
     return [f"(void){one};" for one in arrays if re.search(rf"\b{one}\[", text) is None]
 
 
-def _commented(comment: str, text: str) -> str:
-    return f"{c_comment([comment])}\n{text}"
+def _commented(comment: str | list[str], text: str) -> str:
+    return f"{c_comment([comment] if isinstance(comment, str) else comment)}\n{text}"

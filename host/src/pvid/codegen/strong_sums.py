@@ -70,17 +70,48 @@ class Chain:
 
 
 @dataclass(frozen=True)
+class Noted:
+    """A program with what its values are.
+
+    Attributes
+    ----------
+    program : arguments -> results
+    notes : of some places
+    """
+
+    program: Program
+    notes: dict[int, str]
+
+    @classmethod
+    def of(
+        cls, builder: Builder, names: Sequence[str], wanted: Sequence[sp.Expr], shown: Mapping[sp.Expr, str]
+    ) -> Noted:
+        """Of the results that are wanted; shown: symbols among the definitions, and what they are."""
+        results = tuple(builder.place_of(sp.sympify(e)) for e in wanted)
+        values, notes = tuple(builder.values), dict[int, str]()
+        for symbol, text in shown.items():
+            place = builder.place_of(symbol)
+            notes[place] = f"{notes[place]} = {text}" if place in notes else text
+        return cls(Program(tuple(names), values, results), {at: text for at, text in notes.items() if at < len(values)})
+
+
+@dataclass(frozen=True)
 class Innovation:
     """Residual and gradient of the rows of an instant.
 
     Attributes
     ----------
-    program : p, atoms -> of each kind e, then the entries of `entries`
+    noted : p, atoms -> of each kind e, then the entries of `entries`
     entries : parameters on which the rows of each kind depend
     """
 
-    program: Program
+    noted: Noted
     entries: list[list[int]]
+
+    @property
+    def program(self) -> Program:
+        """Without notes."""
+        return self.noted.program
 
 
 def strong_sums_of(strong: StrongFunctions) -> StrongSums:
@@ -321,6 +352,40 @@ class StrongSums:
             for powers, c in terms
         }
 
+    @cached_property
+    def _shown(self) -> list[sp.Symbol]:
+        """Atoms as comments have them: signals, functions of them, x0, x1 ..; G in the place of the shift's."""
+        named = [str(one) if one.is_Symbol or one.is_Function else f"x{a}" for a, one in enumerate(self.atoms)]
+        taken = {*named, *map(str, self.p)}
+        shifted = next(one for one in ("G", "G_", "G_shifted") if one not in taken)
+        return [sp.Symbol(shifted if a == self._u else one) for a, one in enumerate(named)]
+
+    def _text(self, monomial: Monomial, *, shifted: bool = True) -> str:
+        own = {a: str(one) for a, one in enumerate(self._shown) if shifted or a != self._u}
+        return text_of(monomial, own)
+
+    def about(self, kind: int) -> list[str]:
+        """What the rows of a kind are: Y, P and its gradient."""
+        one = self.kinds[kind]
+        values = dict(zip(self._symbols, self._shown, strict=True))
+        linear = " + ".join(f"{self.p[a]} g[{kind}][{a}]" for a in self.linear if one.gradient[a])
+        rest = self._expression(one.rest).xreplace(values)
+        y = "0" if one.known is None else f"x{one.known}"
+        return [
+            f"Y[{kind}] = {y}",
+            f"P[{kind}] = {' + '.join([*([linear] if linear else []), *([] if rest == 0 else [str(rest)])]) or '0'}",
+            *(
+                f"g[{kind}][{a}] = dP/d{p} = {self._expression(g).xreplace(values)}"
+                for a, (p, g) in enumerate(zip(self.p, one.gradient, strict=True))
+                if g
+            ),
+        ]
+
+    @property
+    def shift_text(self) -> str:
+        """As in G = x1 + w; nothing without a shift."""
+        return "" if self._u is None else f"{self._shown[self._u]} = x{self._u} + {self._w}"
+
     def _expression(self, polynomial: Polynomial) -> sp.Expr:
         terms = [c * sp.Mul(*[self._symbols[a] ** k for a, k in m]) for m, c in polynomial.items()]
         return sp.expand(sp.Add(*terms))
@@ -478,16 +543,23 @@ class StrongSums:
         return [*self.p, *self._weights, *self._sums], [*names, *map(str, self._weights), *map(str, self._sums)]
 
     @cached_property
-    def projection(self) -> Program:
+    def noted_projection(self) -> Noted:
         """p, weights of the kinds, sums -> the upper triangle of S by rows, F."""
         symbols, names = self._arguments()
         builder = Builder(symbols, {}, self._definitions)
         for one in self._first:
             builder.place_of(one)
-        n_p = len(self.p)
-        wanted = [*(self._s[i][j] for i in range(n_p) for j in range(i, n_p)), *self._f]
-        results = tuple(builder.place_of(sp.sympify(e)) for e in wanted)
-        return Program(tuple(names), tuple(builder.values), results)
+        triangle = [(i, j) for i in range(len(self.p)) for j in range(i, len(self.p))]
+        wanted = [*(self._s[i][j] for i, j in triangle), *self._f]
+        shown = {self._sums[at]: f"sum {self._text(one, shifted=False)}" for one, at in self.places.items()}
+        moments = {one: f"sum {self._text(m)}" for m, one in self._moments.items() if one not in shown}
+        whole = {self._s[i][j]: f"S[{i}][{j}]" for i, j in triangle if self._s[i][j].is_Symbol}
+        return Noted.of(builder, names, wanted, {**shown, **moments, **whole})
+
+    @property
+    def projection(self) -> Program:
+        """The same without notes."""
+        return self.noted_projection.program
 
     @cached_property
     def distance(self) -> Program:
@@ -503,6 +575,7 @@ class StrongSums:
         atoms = len(self.atoms)
         shifted = [_SHIFT if a == self._u else one for a, one in enumerate(self._symbols)]
         definitions: dict[sp.Expr, sp.Expr] = {}
+        shown: dict[sp.Expr, str] = {}
         if self._u is not None:
             definitions[_SHIFT] = self._symbols[self._u] + self._w
         values: dict[Monomial, sp.Expr] = {(): sp.Integer(1), **{((a, 1),): shifted[a] for a in range(atoms)}}
@@ -514,14 +587,15 @@ class StrongSums:
             own = {j: sp.Symbol(f"g{k}_{j}") for j, g in enumerate(kind.gradient) if g}
             for j, name in own.items():
                 definitions[name] = sp.Add(*[c * values[m] for m, c in kind.gradient[j].items()])
+                shown[name] = f"g[{k}][{j}]"
             y = sp.Integer(0) if kind.known is None else self._symbols[kind.known]
             rest = sp.Add(*[c * values[m] for m, c in kind.rest.items()])
             wanted += [y - rest - sp.Add(*[self.p[j] * own[j] for j in self.linear if j in own]), *own.values()]
             entries.append(list(own))
         builder = Builder([*self.p, *self._symbols], {}, definitions)
-        results = tuple(builder.place_of(sp.sympify(e)) for e in wanted)
         names = (*(f"p{a}" for a in range(len(self.p))), *(f"x{a}" for a in range(atoms)))
-        return Innovation(Program(names, tuple(builder.values), results), entries)
+        products = {one: self._text(m) for m, one in values.items() if one in definitions}
+        return Innovation(Noted.of(builder, names, wanted, products | shown), entries)
 
     @cached_property
     def bound(self) -> Program:

@@ -1,6 +1,6 @@
-"""The course of parameters that drift along given directions alone (theory.md 4, Drift), from all windows of a run.
+"""The course of parameters that drift along given directions alone, from all windows of a run: theory.md 4, (6d), (6e).
 
-Forwards it is the law of the core: what the windows tell along D grows old. Backwards each window gets what the later
+Forwards what the windows tell along D grows old, as in the core, which lets each kind of rows forget by itself. Backwards each window gets what the later
 ones tell: the smoother of the random walk that the law assumes. All windows are linearised about the course before, so
 that D may turn.
 """

@@ -1,5 +1,5 @@
 """theta(p) and its Jacobian for each row kind, and steps of p: in logarithms where p is positive, limited, and on the
-manifold of the model's constraints (theory.md 4, Constraints)."""
+manifold of the model's constraints (theory.md 4, (6b))."""
 
 from __future__ import annotations
 
@@ -63,14 +63,14 @@ class Parameters:
         return numpy_function(p, [own, slopes, [[[sp.diff(a, other) for other in p] for a in one] for one in slopes]])
 
     def constraints(self, p: Float) -> tuple[Float, Float]:
-        """g [m] and A = dg/d(step) [m, n_p], each divided by the length of its gradient."""
+        """h [m] and A = dh/d(step) [m, n_p], each divided by the length of its gradient."""
         values, slopes, _ = self._constraints(*p)
         a = np.asarray(slopes, np.float64) * self.unit(p)
         length = np.maximum(np.linalg.norm(a, axis=1, keepdims=True), 1e-300)
         return np.asarray(values, np.float64) / length[:, 0], a / length
 
     def curvature(self, p: Float, reactions: Float) -> Float:
-        """sum of reactions [m] times d2 g / d(step)^2 [n_p, n_p], the constraints as in `constraints`."""
+        """sum of reactions [m] times d2 h / d(step)^2 [n_p, n_p], the constraints as in `constraints`."""
         _, slopes, bends = (np.asarray(one, np.float64) for one in self._constraints(*p))
         unit = self.unit(p)
         share = reactions / np.maximum(np.linalg.norm(slopes * unit, axis=1), 1e-300)
@@ -78,7 +78,7 @@ class Parameters:
         return np.asarray(np.einsum("m,mij->ij", share, bends) * np.outer(unit, unit) + of_logarithm)
 
     def tangent(self, p: Float, held: npt.NDArray[np.bool_] | None = None) -> Float | None:
-        """C, an orthonormal base of the steps that keep all constraints and move none of `held` [n_p, free]; None where
+        """T, an orthonormal base of the steps that keep all constraints and move none of `held` [n_p, free]; None where
         every step does. Redundant constraints do no harm."""
         if not self.model.constraints:
             return None

@@ -83,7 +83,7 @@ def misfit(moments: Moments, theta: list[Float]) -> float:
 
 
 def solved(s: Float, f: Float, tangent: Float | None = None) -> Float:
-    """S^-1 f with S scaled to a unit diagonal; C (C^T S C)^-1 C^T f with constraints, whose tangent is C."""
+    """S^-1 f with S scaled to a unit diagonal; T (T^T S T)^-1 T^T f with constraints, whose tangent is T."""
     if tangent is not None:
         return np.asarray(tangent @ solved(tangent.T @ s @ tangent, tangent.T @ f))
     scale = 1 / np.sqrt(np.maximum(s.diagonal(), 1e-300))
@@ -96,7 +96,7 @@ def _ridge(n: int) -> Float:
 
 
 def inverse(s: Float, tangent: Float | None = None) -> Float:
-    """S^-1, S scaled to a unit diagonal; C (C^T S C)^-1 C^T with constraints, whose tangent is C."""
+    """S^-1, S scaled to a unit diagonal; T (T^T S T)^-1 T^T with constraints, whose tangent is T."""
     if tangent is not None:
         return np.asarray(tangent @ inverse(tangent.T @ s @ tangent) @ tangent.T)
     scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
