@@ -32,6 +32,9 @@ SURROUNDINGS = {
     "void show(const float *, const float *);\n",
     "firmware.md": SETTINGS + "float read_encoder(void);\nfloat read_pivot(void);\n"
     "void show(const pvid_estimate_f32 *);\n",
+    "paper.md": '#include "number/finite_f32.h"\n#include "number/unroll.h"\n#include "solve/cholesky_f32.h"\n'
+    "enum { STRONG_P = 4, STRONG_KINDS = 1, STRONG_S = 10, STRONG_INPUTS = 7, STRONG_ATOMS = 6 };\n"
+    "typedef struct { float e[STRONG_KINDS]; float g[STRONG_KINDS][STRONG_P]; } strong_gradient_f32;\n",
 }
 # Pages whose blocks every run of the tests executes; those of the others `./tools/test night`.
 SMOKE = ("README.md", "CONTRIBUTING.md")
