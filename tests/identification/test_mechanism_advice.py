@@ -189,6 +189,27 @@ def test_unit_of_the_time_is_named(name: str, unit: str, scale: float, what: str
 
 
 @pytest.mark.parametrize(
+    ("delay", "wander", "noise", "seed"), [(0.0, 0.3, 0.05, 0), (0.02, 0.3, 0.05, 1), (0.05, 0.05, 0.1, 0)]
+)
+def test_parameter_that_a_ramp_leaves_open_is_no_suspicion_of_units(
+    delay: float, wander: float, noise: float, seed: int
+) -> None:
+    """A motor turns as its voltage rises: its time constant is nowhere seen, so any unit of time or speed may be right."""
+    model = Model("motor on a ramp")
+    u, w = model.input("u", "V", hold="zoh", reach=12), model.sensor("w", "rad/s", resolution=0.1, reach=100)
+    ks, kv, ka = (model.unknown(*of) for of in (("ks", "V", 0.2), ("kv", "V*s", 0.12), ("ka", "V*s^2", 0.02)))
+    model.equation(ka * w.d() + kv * w + ks * sgn(w) - u)
+    rate, random = 200.0, np.random.default_rng(seed)
+    t = np.arange(4200) / rate
+    steady = np.maximum((0.25 * (t - delay) - 0.7) / 0.111, 0.0)
+    load = np.cumsum(random.normal(0.0, 1.0, len(t)))
+    load -= np.linspace(load[0], load[-1], len(t))
+    speed = steady + (steady > 0) * (load * wander / np.std(load) + random.normal(0.0, noise, len(t)))
+    run = {"u": 0.25 * t, "w": np.rint(speed / 0.1) * 0.1}
+    assert advice_on(analysed(Recording(t, run, rate), model.compiled("ramp"))) == ()
+
+
+@pytest.mark.parametrize(
     ("name", "sensor", "offset", "shift"),
     [
         ("ring_down", "x", "x0", 0.011),

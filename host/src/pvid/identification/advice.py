@@ -84,7 +84,7 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
         return of_time
     if answer.recording.origins and answer.found.chi2 > _DIFFER and (own := _of_own(answer)) is not None:
         return (own,)
-    near = _distance(answer, answer.found.p) < _FAR and not _is_beyond_equations(answer)
+    near = _distance(answer, answer.found.p, answer.found.se).least < _FAR and not _is_beyond_equations(answer)
     if answer.identified and answer.found.chi2 < _MISFIT and near:
         return ()
     run = answer.recording.run
@@ -111,7 +111,7 @@ def _unit_of_time(answer: Analysis) -> str | None:
 
     Residuals contain nothing of it: another unit of time gives a linear mechanism other parameters and the same motion.
     """
-    if _distance(answer, answer.found.p) < _FAR:
+    if _distance(answer, answer.found.p, answer.found.se).least < _FAR:
         return None
     design = answer.found.design
     low, high = _DOUBTFUL_RATES
@@ -121,7 +121,7 @@ def _unit_of_time(answer: Analysis) -> str | None:
         scale = _scale(answer, "t", unit)
         other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
         one = _score(answer, design=other)
-        if one is not None and one.known and _distance(answer, one.p) < _NEAR:
+        if one is not None and one.known and _distance(answer, one.p, one.error).most < _NEAR:
             return unit
     return None
 
@@ -137,10 +137,24 @@ def _named(unit: str) -> str:
     return f"ticks of {ticks} Hz" if ticks else number
 
 
-def _distance(answer: Analysis, p: Float) -> float:
-    """The largest factor between a positive parameter and its guess."""
-    of = [value / one.guess for value, one in zip(p, answer.model.unknowns, strict=True) if one.positive]
-    return max((max(ratio, 1 / ratio) if ratio > 0 else np.inf for ratio in of), default=1.0)
+class _Factors(NamedTuple):
+    """The largest factor between a positive parameter and its guess: that of the values that two standard errors
+    allow which is nearest to the guess, of the values themselves, and that of the farthest."""
+
+    least: float
+    own: float
+    most: float
+
+
+def _distance(answer: Analysis, p: Float, se: Float) -> _Factors:
+    positive, guess = np.array([(one.positive, one.guess) for one in answer.model.unknowns]).T
+    ends = p - 2 * se, p + 2 * se
+
+    def largest(*tried: Float) -> float:
+        ratios = (np.array(tried) / guess)[:, positive > 0]
+        return float(np.max(np.where(ratios > 0, np.maximum(ratios, 1 / ratios), np.inf), initial=1.0))
+
+    return _Factors(largest(np.clip(guess, *ends)), largest(p), largest(*ends))
 
 
 def _is_beyond_equations(answer: Analysis) -> bool:
@@ -157,18 +171,19 @@ def _turned(answer: Analysis) -> Iterator[_Mistake]:
             signals = {**answer.recording.signals, signal.name: -answer.recording.signals[signal.name]}
             turned = replace(answer.recording, signals=signals)
             again = attempted(partial(analysed, turned, answer.model, answer.weights))
-            distance = np.inf if again is None else _distance(again, again.found.p)
-            if again is None or not again.identified or distance > _NEAR:
+            if again is None or not again.identified:
+                continue
+            if (factors := _distance(again, again.found.p, again.found.se)).most > _NEAR:
                 continue
             if min(again.found.r2.values()) > _EXPLAINS:
                 said, unit, _ = next(_mistakes(signal, signals[signal.name]))
-                yield _Mistake(again.found.chi2, distance, said, f"{signal.name}={signal.name}:{unit}")
+                yield _Mistake(again.found.chi2, factors.own, said, f"{signal.name}={signal.name}:{unit}")
 
 
 def _tried(answer: Analysis) -> Iterator[_Mistake]:
     """Mistakes that explain the run."""
     model, signals, before = answer.model, answer.recording.run, _score(answer)
-    far = before is None or _distance(answer, before.p) > _FAR or _is_beyond_equations(answer)
+    far = before is None or _distance(answer, before.p, before.error).least > _FAR or _is_beyond_equations(answer)
     for names, said, unit, most in _every_mistake(answer):
         typed = ",".join(f"{name}={name}:{unit}" for name in names)
         scale = _scale(answer, names[0], unit)
@@ -176,13 +191,12 @@ def _tried(answer: Analysis) -> Iterator[_Mistake]:
         scaled = model if abs(scale) == 1 else _with_noise(model, names, abs(scale))
         other = {**signals, **{name: scale * signals[name] for name in names}}
         one = _score(answer, scaled, other)
-        distance = np.inf if one is None or not one.known else _distance(answer, one.p)
-        if one is None or distance > _NEAR:
+        if one is None or not one.known or (factors := _distance(answer, one.p, one.error)).most > _NEAR:
             continue
         left = one.chi2 / before.chi2 if before is not None else 0.0
         implausible = far or (scale < 0 and before is not None and not before.known)
         if left < (most if implausible else _PART):
-            yield _Mistake(left, distance, said, typed)
+            yield _Mistake(left, factors.own, said, typed)
 
 
 def _every_mistake(answer: Analysis) -> Iterator[tuple[list[str], str, str, float]]:
