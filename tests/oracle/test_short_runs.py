@@ -9,7 +9,7 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import SimulatedRig
 from pvid.oracle.weak.choice import chosen
 from pvid.oracle.weak.identify import identify, ready
-from pvid.sim.simulated_run import RigSimulation
+from pvid.sim.simulated_run import RigSimulation, simulation_of
 
 MODEL = compiled_of(ROOT / "tests" / "data" / "recordings" / "free_pendulum.py")
 RATE = 100.0
@@ -30,6 +30,23 @@ def test_run_of_240_samples_is_identified_without_halves() -> None:
     assert found.halves is None
     assert "short" in [one.name for one in found.verdict.reasons]
     assert (np.abs(found.p - SWING.truth) < 4 * found.se).all()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4, 5])
+def test_short_run_of_a_motor_lacks_nothing(seed: int) -> None:
+    """The rows of both equations have the noise of one encoder, which moves by few steps: whitened together they
+    leave 2.4 times what they leave one by one."""
+    model, simulation = compiled_of("dc_motor"), simulation_of("dc_motor")
+    run = {name: values[:700] for name, values in simulation.run(seed).items()}
+    found = identify(model, run, simulation.rig.sample_rate)
+    assert found.chi2 < 1.5 and found.verdict.status == "good"
+    assert (np.abs(found.p - simulation.truth) < 4 * found.se).all()
+
+
+def test_run_that_moves_at_its_begin_alone_is_refused() -> None:
+    at_rest = np.concatenate([SWING.run(0)["q"][:80], np.full(240, np.pi)])
+    with pytest.raises(PvidError, match=r"the run of 320 samples .* or moves in too little of that: record more"):
+        chosen(ready(MODEL), {"q": at_rest}, RATE)
 
 
 def test_run_of_50_samples_is_refused() -> None:
