@@ -70,13 +70,13 @@ typedef enum {
     PVID_UPDATED = 0,         /* p was updated, or is within the dead zone */
     PVID_WARMING_UP,          /* the window of samples is not full yet */
     PVID_ACCUMULATED,         /* data added, no solve due at this tick (divider) */
-    PVID_HELD_NOT_EXCITED,    /* insufficient excitation for p[0]: no drive, kappa below its threshold, or no more
-                                 information than noise gives */
+    PVID_HELD_NOT_EXCITED,    /* insufficient excitation: no drive, kappa of p[0] or the least pivot of any parameter
+                                 below kappa_min, or no more information than noise gives */
     PVID_HELD_SINGULAR,       /* the system could not be solved, or its solution was not finite */
     PVID_REJECTED_NOT_FINITE, /* NaN or infinity in the sample or in its row */
     PVID_REJECTED_OUTLIER,    /* a residual far beyond the usual size: gate.h */
     PVID_REJECTED_SATURATED,  /* a row beyond PVID_ROW_LIMIT */
-    PVID_HELD_UNCERTAIN,      /* not published: standard errors too large, or p not converged */
+    PVID_HELD_UNCERTAIN,      /* not published: standard errors too large, too few windows, or p still moving: trust.h */
     PVID_HELD_OUT_OF_RANGE,   /* window dropped: a sample exceeded its range */
     PVID_MISFIT, /* p was updated, but the residuals exceed the sensors' noise: the model does not fit the mechanism */
     PVID_HELD_FROZEN, /* row or window not used: the identifier is frozen */

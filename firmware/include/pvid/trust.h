@@ -3,11 +3,12 @@
  * The estimator always has a p; this module decides whether it is accurate enough. After every group of rows it
  * checks the present estimate, publishes it or not, and returns the reason:
  *
- *   PVID_UPDATED            published
- *   PVID_MISFIT             published, but the residuals exceed the sensors' noise: the model does not fit
- *   PVID_HELD_NOT_EXCITED   held: too little information on p[0], or no more than noise alone gives
- *   PVID_HELD_SINGULAR         held: the system could not be solved
- *   PVID_HELD_UNCERTAIN     held: standard errors too large, or p not converged
+ *   PVID_UPDATED           published
+ *   PVID_MISFIT            published, but the residuals exceed the sensors' noise: the model does not fit
+ *   PVID_HELD_NOT_EXCITED  held: too little information on a parameter, or no more than noise alone gives
+ *   PVID_HELD_SINGULAR     held: the system could not be solved
+ *   PVID_HELD_UNCERTAIN    held: standard errors above se_max, fewer windows than groups_min, p still moving, or the
+ *                          gate has just opened
  *
  * Until the first estimate is trusted, the published one is the start with start_sd. A published estimate is held until
  * the next one.

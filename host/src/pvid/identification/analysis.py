@@ -23,7 +23,7 @@ from pvid.oracle.weak.weights import Weights
 from pvid.rig.run import Recording
 
 _NOTHING = 1e-6  # of its guess: a positive parameter that has shrunk
-_OF_SECOND = 1.5  # of the allowance of a search: scales of its own bring an answer in 1.0; where nothing fits, in none
+_OF_SECOND = 1.5  # of a search's allowance of work, for the second one: where it succeeds, 1.0 suffices
 
 
 @np.errstate(all="ignore")  # what diverges is judged, and told in words

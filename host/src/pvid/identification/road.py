@@ -30,8 +30,8 @@ def identified(
     Parameters
     ----------
     weights : of the rows; those of the sensors alone are not compared with others
-    refine : the full equations are fitted to the whole recording, from the answer on; None: of a single recording,
-        where the model has equations of its own for that, because those of its rows are approximations
+    refine : fit the full equations to the whole recording, from the answer on; None: refine a single recording if
+        the model has separate, more exact equations for that
     predict : with the prediction of unseen motion; where the equations do not explain the recording, publish the
         estimate that predicts it best
     own : unknowns that have a value of their own in each of several recordings

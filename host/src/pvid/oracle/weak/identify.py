@@ -51,7 +51,7 @@ class Identified:
     causes : of the scale part: constants, gains and the clock that have a standard deviation, neglected terms
     by_model : what p may be off by because the equations lack something, or a signal is not what was recorded [n_p]
     lacking : what the equations seem to lack; None: the numbers of the test ran away
-    named : the terms that explain it; None: nothing is lacking that moves a parameter visibly
+    named : the terms that explain it; None: none does, or what is lacking is small or has another cause
     shifts : what p may be off by that way, and how far other estimates are [terms, n_p]
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     covariance : of p, that of `predicted` [n_p, n_p]

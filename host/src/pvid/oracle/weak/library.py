@@ -104,7 +104,7 @@ class Library:
         return Scores(self.fit)
 
     def by_gain(self, name: str) -> Float:
-        """What p is off by if a signal is recorded (1 + g) times as large as it is, over g [n_p]."""
+        """Change of p per relative gain error of the signal [n_p]."""
         if name not in self._by_gain:
             recorded, none = self.recorded(name), np.zeros(len(self.fit.p))
             self._by_gain[name] = self.scores.shift(self.act(recorded, GAIN, 0.0)) if recorded.top else none
