@@ -26,6 +26,7 @@ from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, WeakRows
+from pvid.oracle.weak.solve import COMPARED, PASSES_COMPARED
 from pvid.oracle.weak.starts import starts_about
 
 _FEWEST_WINDOWS = 18
@@ -38,10 +39,6 @@ _FUNCTIONS = (12, 24, 40)
 _FEW_FUNCTIONS = (5, 8)  # of runs with motion that the equations do not explain: it is above the drive's frequencies
 _RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
 _FLAT_RATES = ((11, 4), (21, 6), (41, 8), (81, 8), (141, 8))  # for a drive that is measured: see pvid.oracle.weak.blur
-
-# Enough to compare designs, each from the best p so far: a step is far below what scores differ by.
-_PASSES = 10
-_SETTLED = 1e-5
 
 # Where the equations err, scores differ by less than this factor for no reason, and a reversal of the motion is blurred
 # over the samples of a rate.
@@ -141,7 +138,7 @@ def _scored(
         rows = WeakRows.of(model, run, design)
         if rows.windows < fewest:
             return None
-        fit = gated(rows, start, equation_error=errors, passes=_PASSES, settled=_SETTLED)
+        fit = gated(rows, start, equation_error=errors, passes=PASSES_COMPARED, settled=COMPARED)
         own = Assessed.of(fit)
         other = other_line(fit)
         blurred = shift_of(fit, run, design)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import EquationError
-from pvid.oracle.weak.solve import RIDGE, Fit, inverse
+from pvid.oracle.weak.solve import RIDGE, Fit, inverse, of_fit
 
 _NOISE_SHARE = 0.1  # of the information along a direction, below which its standard error is that of the whole
 _CHANCE = 3.0  # standard deviations of that share
@@ -221,6 +221,7 @@ def clustered_variance(scores: Float, s_inverse: Float) -> Float:
     return np.asarray(few * np.max([local, near, wide], axis=0))
 
 
+@of_fit
 def chi2_of_sensors(fit: Fit) -> float:
     """Mean square of the residuals in the metric of the sensors' noise alone."""
     theta = fit.parameters.theta(fit.p)

@@ -32,7 +32,7 @@ from pvid.oracle.weak.rows import ready as ready
 from pvid.oracle.weak.samples import explains, of_samples
 from pvid.oracle.weak.scale import of_scale
 from pvid.oracle.weak.shared import Cause, or_nan
-from pvid.oracle.weak.solve import DivergedError, Fit, batch, online
+from pvid.oracle.weak.solve import COMPARED, PASSES_COMPARED, DivergedError, Fit, batch, online
 from pvid.oracle.weak.verdict import Attempts, Halves, Judged, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
 
@@ -402,7 +402,8 @@ def shorter_rates(
     taps = 2 * round(_SHORTER * design.rate_taps / 2) + 1
     if not any(jet.order for jet in model.channels.needed) or taps <= design.rate_degree + 2:
         return None
-    return gated(WeakRows.of(model, run, replace(design, rate_taps=taps)), p, equation_error)
+    rows = WeakRows.of(model, run, replace(design, rate_taps=taps))
+    return gated(rows, p, equation_error, passes=PASSES_COMPARED, settled=COMPARED)
 
 
 def other_length(
@@ -416,5 +417,5 @@ def other_length(
         except PvidError:
             continue
         if rows.windows >= 8:
-            return gated(rows, p, equation_error)
+            return gated(rows, p, equation_error, passes=PASSES_COMPARED, settled=COMPARED)
     return None

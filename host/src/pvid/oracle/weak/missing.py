@@ -23,7 +23,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.scores import FOLDS, Scores
-from pvid.oracle.weak.solve import Fit, resumed
+from pvid.oracle.weak.solve import Fit, of_fit, resumed
 from pvid.oracle.weak.terms import CONSTANT, JUMPS, OF_LOAD, OF_PARAMETER, UNUSUAL, UNUSUAL_LAWS, Act, Candidate, Course
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
@@ -354,6 +354,7 @@ def _plainness(one: Candidate) -> int:
     return 0 if one.kind in (CONSTANT, OF_PARAMETER) else 1 if one.kind is OF_LOAD else 2
 
 
+@of_fit
 def unlikelihood(fit: Fit) -> float:
     """Minus twice the logarithm of the likelihood of all residuals, but for a constant."""
     theta = fit.parameters.theta(fit.p)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass, field, replace
+from functools import cache, wraps
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,8 @@ _STEPS = 30  # of Gauss-Newton between two whitenings
 _PIVOTS = 256  # of the bounds that act in a step
 _CURVED = 0.2  # of S: least curvature with that of the constraints
 SETTLED = 1e-8  # a step below this ends the search
+COMPARED, PASSES_COMPARED = 1e-5, 10  # enough to compare estimates: far below what they differ by
+_STILL = 1e-5  # standard errors: a smaller step of Gauss and Newton is along what the rows do not determine
 
 # An error of the equation is taken for real if it raises twice the logarithm of the likelihood by this much.
 _EVIDENCE = 10.0
@@ -126,7 +128,7 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
                 break
             step = step / 2
         p = moved
-        if size < SETTLED:
+        if size < SETTLED or (k >= 2 and step @ (s + weak) @ step < _STILL**2):
             break
     return p, first
 
@@ -195,6 +197,7 @@ class Fit:
     start : where the search began
     settled : the last step was tiny
     diverged : the search ran away; p is where it last could be computed with
+    numbers : of it, that were computed (`of_fit`)
     """
 
     p: Float
@@ -204,6 +207,7 @@ class Fit:
     start: Float
     settled: bool
     diverged: bool = False
+    numbers: dict[str, float] = field(init=False, default_factory=dict, repr=False, compare=False)
 
     @property
     def parameters(self) -> Parameters:
@@ -237,6 +241,18 @@ class Fit:
         """Whitened, of each group [windows, R]."""
         theta = self.parameters.theta(self.p)
         return [one.residuals(theta) for one in self.white]
+
+
+def of_fit(number: Callable[[Fit], float]) -> Callable[[Fit], float]:
+    """A number of a fit that is computed once: a whitening of all rows each."""
+
+    @wraps(number)
+    def kept(fit: Fit) -> float:
+        if number.__name__ not in fit.numbers:
+            fit.numbers[number.__name__] = number(fit)
+        return fit.numbers[number.__name__]
+
+    return kept
 
 
 class DivergedError(ArithmeticError):
@@ -293,8 +309,8 @@ def _passes(
     parameters = rows.compiled.parameters
     p = begun = parameters.checked(start)
     prior = parameters.prior(begun)
-    errors = [EquationError()] * rows.kinds
-    settled = False
+    errors = before = [EquationError()] * rows.kinds
+    settled, size = False, np.inf
     for turn in range(passes):
         if turn >= _LEAST_PASSES and work.is_spent():
             break
@@ -304,20 +320,20 @@ def _passes(
         yield Fit(p, rows, white, errors, begun, settled=False)
         moments = compensated(rows, white, theta) if compensate else Moments.of(white)
         p, size = gauss_newton(parameters, moments, p, prior, 3 if turn < 4 else _STEPS)
-        changed = False
+        before, changed = errors, False
         if equation_error and turn >= 2:
             now = parameters.theta(p)
-            found = [improved(rows, kind, now, errors[kind], turn) for kind in range(rows.kinds)]
-            changed = any(differs(a, b) for a, b in zip(errors, found, strict=True))
-            errors = found
-        if size < enough and turn >= (3 if equation_error else 1) and not changed:
+            errors = [improved(rows, kind, now, errors[kind], turn) for kind in range(rows.kinds)]
+            changed = any(differs(a, b) for a, b in zip(before, errors, strict=True))
+        settled = size < 1e-4
+        if size < enough and turn >= (2 if equation_error else 1) and not changed:
             settled = True
             break
-        settled = size < 1e-4
-    theta = parameters.theta(p)
-    white = [rows.white(group, theta, errors) for group in rows.groups]
     if not np.isfinite(p).all():
         raise FloatingPointError
+    if not settled or size >= enough or errors != before:  # else the rows are as white as they become
+        theta = parameters.theta(p)
+        white = [rows.white(group, theta, errors) for group in rows.groups]
     yield Fit(p, rows, white, errors, begun, settled)
 
 
@@ -328,17 +344,18 @@ def resumed(rows: WeakRows, fit: Fit, passes: int) -> Fit:
     Raises numpy.linalg.LinAlgError, FloatingPointError when the numbers run away.
     """
     parameters, p, errors = rows.compiled.parameters, fit.p, fit.errors
-    prior = parameters.prior(fit.start)
+    prior, size = parameters.prior(fit.start), np.inf
     for turn in range(passes + 1):
         work.spend(rows.work)
-        theta = parameters.theta(p)
+        theta, before = parameters.theta(p), errors
         errors = [
             sharpened(rows.unexplained(k, theta), rows.functions, one, 1) if one.variance else one
             for k, one in enumerate(errors)
         ]
         white = [rows.white(group, theta, errors) for group in rows.groups]
-        if turn < passes:
-            p, _ = gauss_newton(parameters, compensated(rows, white, theta), p, prior, 3)
+        if turn == passes or size < COMPARED and not any(map(differs, before, errors)):
+            break
+        p, size = gauss_newton(parameters, compensated(rows, white, theta), p, prior, 3)
     if not np.isfinite(p).all():
         raise FloatingPointError
     return Fit(p, rows, white, errors, fit.start, settled=True)
