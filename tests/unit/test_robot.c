@@ -189,9 +189,31 @@ static void noise_of_the_encoder_does_not_move_the_parameters(void **state)
     }
 }
 
+static void more_noise_than_motion_is_not_published(void **state)
+{
+    static const float loud[2] = {0.003f, 0.02f}; /* the noise of the rate is 0.3 and twice the rate */
+    for (unsigned k = 0; k < 2u; k++) {
+        blur = loud[k];
+        begin();
+        float sample[2];
+        unsigned uncertain = 0;
+        unsigned number = 0;
+        for (unsigned tick = 0; tick < 24000u; tick++) {
+            sample_at(tick, 2.0, sample);
+            const pvid_reason reason = pvid_robot_step_f32(&robot, sample);
+            number += (reason == PVID_UPDATED) ? 1u : 0u;
+            uncertain += ((reason == PVID_HELD_UNCERTAIN) || (reason == PVID_HELD_SINGULAR)) ? 1u : 0u;
+        }
+        assert_true((k == 0u) ? ((number > 20u) && (uncertain < number)) : ((number == 0u) && (uncertain > 20u)));
+    }
+    blur = 0.0f;
+}
+
 static void the_covariance_has_the_standard_errors(void **state)
 {
+    blur = 0.001f;
     begin();
+    blur = 0.0f; /* of the rest: columns are expected to be noisy, and are not */
     float column_of[P];
     assert_false(pvid_robot_covariance_f32(&robot, 0, column_of));
     float sample[2];
@@ -350,7 +372,7 @@ static void errors_do_not_depend_on_a_bad_start(void **state)
         config.start = (k == 0u) ? far_off : near_by;
         config.start_sd = wide;
         assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
-        (void)play(0, 9000, 2.0);
+        (void)play(0, 12000, 2.0); /* the joint begins again until 2 500 */
         require_truth(2.0);
         assert_true(pvid_robot_read_f32(&robot, estimate[k], NULL));
     }
@@ -503,9 +525,9 @@ static void what_is_out_of_range_is_refused_by_its_status(void **state)
     config.group = 3;
     refuse(&config, PVID_BAD_WINDOW);
     config = config_of();
-    config.group = 4; /* 14 stages and a beginning need 5 intervals: of 5 ticks one is for the row, one ends it */
+    config.group = 8; /* 16 stages and a beginning need 9 intervals: of 5 ticks two are for the row, one ends it */
     refuse(&config, PVID_BAD_WINDOW);
-    config.group = 5;
+    config.group = 9;
     assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
     config.group = 0;
     refuse(&config, PVID_BAD_WINDOW);
@@ -549,6 +571,7 @@ static void before_init_nothing_is_done(void **state)
 static const struct CMUnitTest tests[] = {
     cmocka_unit_test(the_parameters_of_a_joint_are_found_with_their_errors),
     cmocka_unit_test(noise_of_the_encoder_does_not_move_the_parameters),
+    cmocka_unit_test(more_noise_than_motion_is_not_published),
     cmocka_unit_test(the_covariance_has_the_standard_errors),
     cmocka_unit_test(a_changed_joint_is_followed_with_a_short_memory),
     cmocka_unit_test(what_is_not_finite_restarts_the_splines_and_keeps_the_sums),

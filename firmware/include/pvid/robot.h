@@ -13,10 +13,14 @@
  * Cholesky, a row of the factor each tick. Then F_i -= S_i dp and Q_i follow p: rounding of S_i acts on dp alone. Where
  * Q_i falls below 2^-10 of itself the joint's sums begin again at the new p. No window of samples is kept.
  *
- * Noise of the encoders is in the columns, too: a part d of a row moves F by -d (d p) in the mean. As much noise is
- * therefore added again, from a table of one period. What that changes in a row is such a d, and G_i = sum d (d p), as
- * if of all rows, is added to F_i in the equation. G_i begins with the first estimate, forgets within 16 of them, and
- * begins again where Q_i falls by a tenth.
+ * Noise of the encoders is in the columns, too: a part d of a row adds d d^T to S and moves F by -d (d p) in the mean.
+ * As much noise is therefore added again, from a table of one period. What that changes in a row is such a d: with
+ * D_i = sum d d^T the equation is A dp = sum_i (F_i + D_i p) / s_i^2 + prior, A = sum_i (S_i - D_i) / s_i^2 + prior.
+ *
+ * Errors are of A^-1 (A + (1 + 4 r) D) A^-1, D = sum_i D_i / s_i^2: of S e, and of d (d p), whose variance for Gaussian
+ * d of covariance C is C (p^T C p) + C p p^T C, at most 2 C p^T C p; both the noise and what is added again have it,
+ * and r is the part p^T D_i p / rows_i of s_i^2, the largest of all joints, at most 1. Where x^T D x > x^T A x in the
+ * direction x = A^-1 e_k of a parameter, half of S is noise, and nothing is published.
  *
  *   static pvid_robot_f32 identifier;
  *   static float memory[ARM_MEMORY];
@@ -90,7 +94,7 @@ typedef struct {
     const float *start;                  /* [p] first estimate, as of the robot's file, within 1e9 */
     const float *start_sd;               /* [p] its standard deviation, 1e-9..1e9 */
     uint16_t group; /* accepted rows of a joint, in the mean of the joints, between two estimates: 1..65535, of which an
-                       estimate, 3 n + 2 p + 4 free ticks, needs some */
+                       estimate, 5 n + (2 + p / 10) p + 4 free ticks (p / 10: at most 2), needs some */
     uint32_t memory; /* rows of a joint, 8 p..2^20: as many count in full, older ones half each time */
 } pvid_robot_config_f32;
 
@@ -102,9 +106,10 @@ typedef struct {
     uint32_t sums;   /* [2 slots + n][4] columns, torques, then changes by the noise, of each spline */
     uint32_t white;  /* [3][2 slots + n] the last white rows */
     uint32_t s;      /* lower triangle of each joint */
+    uint32_t d;      /* likewise */
     uint32_t f;      /* [slots] */
-    uint32_t g;      /* [slots] */
-    uint32_t m;      /* lower triangle [p]; then its factor L */
+    uint32_t m;      /* lower triangle [p] of A; then its factor L */
+    uint32_t noise;  /* lower triangle [p] of D */
     uint32_t z;      /* [p] */
     uint32_t delta;  /* [p] dp */
     uint32_t p;      /* [p] to which F and Q refer */
@@ -123,7 +128,8 @@ typedef struct {
     pvid_publication_mark mark;
     float q[PVID_ROBOT_JOINTS];        /* Q_i */
     uint32_t rows[PVID_ROBOT_JOINTS];  /* accepted, in S_i */
-    float noisy[PVID_ROBOT_JOINTS];    /* rows in G_i */
+    float part;                        /* of s_i^2 that is noise of the encoders, the largest of all joints */
+    bool rounded[PVID_ROBOT_JOINTS];   /* Q_i is the rounding of a far larger one: the joint begins again */
     uint32_t doubt[PVID_ROBOT_JOINTS]; /* 16 for each outlier, less 1 for each accepted row */
     uint32_t rejected;                 /* samples that were not finite, or beyond their range */
     uint32_t saturated;                /* rows beyond 1e9 */
@@ -138,7 +144,7 @@ typedef struct {
     uint8_t spline;  /* the youngest one, of 4 */
     uint8_t young;   /* intervals until a spline has been added from its start on */
     uint8_t latest;  /* place of the latest white rows, of 3 */
-    uint8_t row;     /* joint whose row is next; all: none */
+    uint8_t row;     /* twice the joint whose row is next, and 1: what noise changes in it; all: none */
     uint8_t noise;   /* place of the step in the added noise */
     uint8_t stage;
     uint8_t index;     /* within the stage */
@@ -167,9 +173,9 @@ pvid_status pvid_robot_init_f32(pvid_robot_f32 *self, const pvid_robot_config_f3
  *   - PVID_REJECTED_NOT_FINITE for a sample that is not, PVID_REJECTED_SATURATED for |q| > 16384 or a torque beyond
  * 1e9, or a row beyond 1e9, PVID_REJECTED_OUTLIER for a row: each restarts the splines,
  *   - PVID_UPDATED at the tick of a new estimate,
- *   - PVID_HELD_UNCERTAIN in its place while a standard error is not below half its start_sd: motion or time is
- * missing,
- *   - PVID_HELD_SINGULAR where the system has no solution in float32 within 1e9,
+ *   - PVID_HELD_UNCERTAIN in its place while a standard error is not below half its start_sd, or the noise of the
+ * encoders is more than half of S in the direction of a parameter: motion or time is missing,
+ *   - PVID_HELD_SINGULAR where A is not positive definite, or its solution is beyond 1e9,
  *   - PVID_NOT_READY before init, else PVID_ACCUMULATED. */
 pvid_reason pvid_robot_step_f32(pvid_robot_f32 *self, const float sample[]);
 
@@ -181,7 +187,7 @@ void pvid_robot_gap_f32(pvid_robot_f32 *self);
 bool pvid_robot_read_f32(const pvid_robot_f32 *self, float estimate[], uint32_t *number);
 
 /* Column k of the covariance of the latest estimate, out[p]. Fails iff `self` is not initialised, there is no k, or a
- * group has begun since, until the next PVID_UPDATED: call it at that tick, or soon after. Cost: p^2 multiplications.
+ * group has begun since, until the next PVID_UPDATED: call it at that tick, or soon after. Cost: 3 p^2 multiplications.
  */
 bool pvid_robot_covariance_f32(const pvid_robot_f32 *self, uint8_t k, float out[]);
 

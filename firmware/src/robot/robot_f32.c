@@ -22,15 +22,13 @@
 #define DOUBT 16u             /* accepted rows that outweigh an outlier */
 #define OPEN 64u              /* doubt from which the gate lets all pass */
 #define FALL 9.765625e-4f     /* of Q_i, beyond which it is rounding */
-#define AGAIN 0.9f            /* of Q_i, beyond which G_i was of another p */
-#define AGING 0.9375f         /* of G_i, an estimate */
-#define FIRST_ROWS 2.0f       /* of G_i: as if as many had no noise */
+#define QUADRATIC 4.0f        /* of D, where all of s_i^2 is noise of the encoders */
 #define KNOWN 0.5f            /* standard error of a known parameter, of that of the start */
 #define MOST_TAPS 1024u
 #define MOST_ROWS 1048576u
 #define MOST_TICKS 65535u /* of an interval */
 
-enum { IDLE, FORGET, ASSEMBLE, FACTOR, BACKWARD, CORRECT, ERRORS, PUBLISH };
+enum { IDLE, ASSEMBLE, NOISE, FORCES, FACTOR, BACKWARD, CORRECT, FORGET, ERRORS, PUBLISH };
 
 /* Entries of a packed triangle of n rows: row i begins at triangle(i). */
 static inline uint32_t triangle(uint32_t n)
@@ -71,10 +69,11 @@ static uint32_t places(const pvid_robot_model_f32 *model, const pvid_robot_desig
     self->at.sums = self->at.inputs + (6u * n);
     self->at.white = self->at.sums + (SPLINES * ((2u * slots) + n));
     self->at.s = self->at.white + (PAST * ((2u * slots) + n));
-    self->at.f = self->at.s + before(model, model->joints);
-    self->at.g = self->at.f + slots;
-    self->at.m = self->at.g + slots;
-    self->at.z = self->at.m + triangle(p);
+    self->at.d = self->at.s + before(model, model->joints);
+    self->at.f = self->at.d + before(model, model->joints);
+    self->at.m = self->at.f + slots;
+    self->at.noise = self->at.m + triangle(p);
+    self->at.z = self->at.noise + triangle(p);
     self->at.delta = self->at.z + p;
     self->at.p = self->at.delta + p;
     self->at.next = self->at.p + p;
@@ -155,6 +154,19 @@ static uint32_t free_ticks(const pvid_robot_design_f32 *design)
     return ((uint32_t)design->interval * ((design->decimation > 2u) ? (design->decimation - 2u) : 1u)) - 1u;
 }
 
+/* Those of them that the rows of all joints take. */
+static uint32_t ticks_of_rows(const pvid_robot_design_f32 *design, uint32_t joints)
+{
+    return (free_ticks(design) > (2u * joints)) ? (2u * joints) : joints;
+}
+
+/* Ticks that the standard error of a parameter takes: none of them more than the row of a joint. */
+static uint32_t ticks_of_error(uint32_t p)
+{
+    const uint32_t ticks = 1u + (p / 10u);
+    return (ticks < 3u) ? ticks : 3u;
+}
+
 static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *config, float memory[], uint32_t room)
 {
     const pvid_robot_model_f32 *model = config->model;
@@ -168,9 +180,11 @@ static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *co
     if (!design_is_valid(design, model->joints)) {
         return PVID_BAD_DESIGN;
     }
+    const uint32_t rows = ticks_of_rows(design, model->joints);
     const uint32_t left = free_ticks(design);
-    const uint32_t stages = (3u * (uint32_t)model->joints) + (2u * (uint32_t)model->p) + 3u;
-    if ((left <= model->joints) || ((config->group * (left - model->joints)) <= stages)) { /* and one to begin with */
+    const uint32_t stages =
+        (5u * (uint32_t)model->joints) + ((1u + ticks_of_error(model->p)) * (uint32_t)model->p) + 3u;
+    if ((left <= rows) || ((config->group * (left - rows)) <= stages)) { /* and one to begin with */
         return PVID_BAD_WINDOW;
     }
     if (!are_within(config->start, model->p, ROW_LIMIT)) {
@@ -222,7 +236,7 @@ PVID_COLD void pvid_robot_gap_f32(pvid_robot_f32 *self)
     self->place = 0;
     self->tick = 0;
     self->young = PAST;
-    self->row = self->config.model->joints;
+    self->row = (uint8_t)(2u * self->config.model->joints);
     self->begun = false;
 }
 
@@ -391,10 +405,24 @@ static bool has_rows(const pvid_robot_f32 *self, uint8_t joint)
     return (self->rows[joint] * n) >= ((2u * (uint32_t)self->config.model->p) + n);
 }
 
+/* The lower triangle of x x^T. */
+static void add_square(float to[], const float x[], uint32_t n)
+{
+    float *row = to;
+    for (uint32_t i = 0; i < n; i++) {
+        const float own = x[i];
+        PVID_UNROLL_BY_FOUR
+        for (uint32_t j = 0; j <= i; j++) {
+            row[j] += own * x[j];
+        }
+        row = &row[i + 1u];
+    }
+}
+
 static pvid_reason add_row(pvid_robot_f32 *self)
 {
     const pvid_robot_model_f32 *model = self->config.model;
-    const uint8_t joint = self->row;
+    const uint8_t joint = (uint8_t)(self->row / 2u);
     const uint16_t first = first_of(model, joint);
     const uint32_t n = (uint32_t)model->end[joint] - first;
     const float *u = &self->memory[self->at.white + (self->latest * width_of(self)) + first];
@@ -402,15 +430,12 @@ static pvid_reason add_row(pvid_robot_f32 *self)
     const float *p = &self->memory[(joint < self->corrected) ? self->at.next : self->at.p];
     float *s = &self->memory[self->at.s + before(model, joint)];
     float *f = &self->memory[self->at.f + first];
-    float *g = &self->memory[self->at.g + first];
     const float y = u[((uint32_t)self->slots + joint) - first];
     self->row++;
     float e = y;
-    float by_noise = 0.0f;
     bool fits = pvid_magnitude_f32(y) <= ROW_LIMIT; /* NaN fails the comparison */
     for (uint32_t i = 0; i < n; i++) {
         e -= u[i] * p[model->column[first + i]];
-        by_noise += d[i] * (model->share[model->column[first + i]] * p[model->column[first + i]]);
         fits = fits && (pvid_magnitude_f32(u[i]) <= ROW_LIMIT) && (pvid_magnitude_f32(d[i]) <= ROW_LIMIT);
     }
     if (!fits || !(pvid_magnitude_f32(e) <= ROW_LIMIT)) {
@@ -426,36 +451,28 @@ static pvid_reason add_row(pvid_robot_f32 *self)
     self->doubt[joint] -= (self->doubt[joint] > 0u) ? 1u : 0u;
     self->rows[joint]++;
     self->since++;
+    add_square(s, u, n);
     for (uint32_t i = 0; i < n; i++) {
-        const float x = u[i];
-        PVID_UNROLL_BY_FOUR
-        for (uint32_t j = 0; j <= i; j++) {
-            s[j] += x * u[j];
-        }
-        s = &s[i + 1u];
-        f[i] += x * e;
+        f[i] += u[i] * e;
     }
     self->q[joint] += e * e;
-    if (self->number > 0u) {
-        for (uint32_t i = 0; i < n; i++) {
-            g[i] += by_noise * d[i];
-        }
-        self->noisy[joint] += 1.0f;
-    }
     return PVID_ACCUMULATED;
 }
 
-/* ---- the estimate, a stage a tick ---- */
-
-/* The rows in G of a joint count less. */
-static void forget_noise(pvid_robot_f32 *self, uint8_t joint, float by)
+/* What the added noise changes in the row that add_row has added. */
+static void add_noise(pvid_robot_f32 *self)
 {
     const pvid_robot_model_f32 *model = self->config.model;
-    for (uint32_t i = first_of(model, joint); i < model->end[joint]; i++) {
-        self->memory[self->at.g + i] *= by;
-    }
-    self->noisy[joint] *= by;
+    const uint8_t joint = (uint8_t)(self->row / 2u);
+    const uint16_t first = first_of(model, joint);
+    const uint32_t changes = (uint32_t)self->slots + model->joints + first;
+    add_square(&self->memory[self->at.d + before(model, joint)],
+               &self->memory[self->at.white + (self->latest * width_of(self)) + changes],
+               (uint32_t)model->end[joint] - first);
+    self->row++;
 }
+
+/* ---- the estimate, a stage a tick ---- */
 
 /* All rows of a joint count less. */
 static void forget(pvid_robot_f32 *self, uint8_t joint, float by)
@@ -465,6 +482,7 @@ static void forget(pvid_robot_f32 *self, uint8_t joint, float by)
     const uint32_t end = before(model, (uint8_t)(joint + 1u));
     for (uint32_t i = before(model, joint); i < end; i++) {
         memory[self->at.s + i] *= by;
+        memory[self->at.d + i] *= by;
     }
     for (uint32_t i = first_of(model, joint); i < model->end[joint]; i++) {
         memory[self->at.f + i] *= by;
@@ -472,37 +490,72 @@ static void forget(pvid_robot_f32 *self, uint8_t joint, float by)
     self->q[joint] *= by;
     const float rows = by * (float)self->rows[joint];
     self->rows[joint] = (uint32_t)rows;
-    forget_noise(self, joint, by);
 }
 
-/* M and the right side: those of the start, then joint by joint. */
-static void assemble(pvid_robot_f32 *self, uint8_t joint)
+/* 1 / s_i^2. */
+static float weight_of(const pvid_robot_f32 *self, uint8_t joint)
+{
+    return free_rows(self, joint) / ((self->q[joint] > LEAST_Q) ? self->q[joint] : LEAST_Q);
+}
+
+/* M and the right side begin as those of the start. */
+static void begin_assembly(pvid_robot_f32 *self)
 {
     const pvid_robot_model_f32 *model = self->config.model;
     float *memory = self->memory;
-    float *m = &memory[self->at.m];
-    if (joint == 0u) {
-        memset(m, 0, triangle(model->p) * sizeof m[0]);
-        for (uint32_t k = 0; k < model->p; k++) {
-            const float sd = self->config.start_sd[k];
-            const float weight = 1.0f / (sd * sd);
-            m[triangle(k) + k] = weight;
-            memory[self->at.z + k] = weight * (self->config.start[k] - memory[self->at.p + k]);
-        }
+    memset(&memory[self->at.m], 0, triangle(model->p) * sizeof memory[0]);
+    for (uint32_t k = 0; k < model->p; k++) {
+        const float sd = self->config.start_sd[k];
+        const float weight = 1.0f / (sd * sd);
+        memory[self->at.m + triangle(k) + k] = weight;
+        memory[self->at.z + k] = weight * (self->config.start[k] - memory[self->at.p + k]);
     }
-    const float weight = free_rows(self, joint) / ((self->q[joint] > LEAST_Q) ? self->q[joint] : LEAST_Q);
-    const float of_noise = (float)self->rows[joint] / (self->noisy[joint] + FIRST_ROWS);
+}
+
+/* Adds the triangle of a joint to that of all parameters. */
+static void assemble(pvid_robot_f32 *self, uint8_t joint, uint32_t from, uint32_t to)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    const float weight = weight_of(self, joint);
     const uint16_t first = first_of(model, joint);
-    const float *s = &memory[self->at.s + before(model, joint)];
+    const float *x = &self->memory[from + before(model, joint)];
     for (uint32_t i = first; i < model->end[joint]; i++) {
-        float *row = &m[triangle(model->column[i])];
+        float *row = &self->memory[to + triangle(model->column[i])];
         PVID_UNROLL_BY_FOUR
         for (uint32_t j = first; j <= i; j++) {
-            row[model->column[j]] += weight * s[j - first];
+            row[model->column[j]] += weight * x[j - first];
         }
-        s = &s[(i - first) + 1u];
-        memory[self->at.z + model->column[i]] +=
-            weight * (memory[self->at.f + i] + (of_noise * memory[self->at.g + i]));
+        x = &x[(i - first) + 1u];
+    }
+}
+
+/* Adds F and D p to the right side. */
+static void add_forces(pvid_robot_f32 *self, uint8_t joint)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    float *memory = self->memory;
+    const float weight = weight_of(self, joint);
+    const uint8_t *column = &model->column[first_of(model, joint)];
+    const uint32_t n = (uint32_t)model->end[joint] - first_of(model, joint);
+    const float *d = &memory[self->at.d + before(model, joint)];
+    float p[PVID_ROBOT_P];
+    float sum[PVID_ROBOT_P];
+    for (uint32_t i = 0; i < n; i++) {
+        p[i] = model->share[column[i]] * memory[self->at.p + column[i]];
+        sum[i] = memory[self->at.f + first_of(model, joint) + i];
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        float mine = d[i] * p[i];
+        PVID_UNROLL_BY_FOUR
+        for (uint32_t j = 0; j < i; j++) {
+            mine += d[j] * p[j];
+            sum[j] += d[j] * p[i];
+        }
+        sum[i] += mine;
+        d = &d[i + 1u];
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        memory[self->at.z + column[i]] += weight * sum[i];
     }
 }
 
@@ -516,10 +569,13 @@ static float product(const float x[], const float y[], uint32_t n)
     return sum;
 }
 
-/* Row i of L, M = L L^T, in the place of M's, and z = L^-1 of the right side; false: a pivot is too small. */
-static bool factor_row(float m[], float z[], uint32_t i)
+/* Row i of L, M - D = L L^T, in the place of M's, and z = L^-1 of the right side; false: a pivot is too small. */
+static bool factor_row(float m[], const float d[], float z[], uint32_t i)
 {
     float *row = &m[triangle(i)];
+    for (uint32_t j = 0; j <= i; j++) {
+        row[j] -= d[triangle(i) + j];
+    }
     const float diagonal = row[i];
     for (uint32_t j = 0; j < i; j++) {
         const float *other = &m[triangle(j)];
@@ -548,17 +604,28 @@ static void backward(const float m[], float z[], uint32_t n)
     }
 }
 
-/* z = L^-1 e_k [n]; entries before k are not written. */
-static void unit_forward(const float m[], float z[], uint32_t k, uint32_t n)
+/* z = L^-1 z [n], whose entries before k are 0. */
+static void forward(const float m[], float z[], uint32_t k, uint32_t n)
 {
-    z[k] = 1.0f / m[triangle(k) + k];
-    for (uint32_t i = k + 1u; i < n; i++) {
+    for (uint32_t i = k; i < n; i++) {
         const float *row = &m[triangle(i)];
-        z[i] = -product(&row[k], &z[k], i - k) / row[i];
+        z[i] = (z[i] - product(&row[k], &z[k], i - k)) / row[i];
     }
 }
 
-/* F and Q of a joint at p + delta. Where Q is the rounding of a far larger one, the joint begins again there. */
+/* x^T D x of a lower triangle. */
+static float quadratic(const float d[], const float x[], uint32_t n)
+{
+    const float *row = d;
+    float sum = 0.0f;
+    for (uint32_t i = 0; i < n; i++) {
+        sum += x[i] * ((2.0f * product(row, x, i)) + (row[i] * x[i]));
+        row = &row[i + 1u];
+    }
+    return sum;
+}
+
+/* F and Q of a joint at p + delta. */
 static void correct(pvid_robot_f32 *self, uint8_t joint)
 {
     const pvid_robot_model_f32 *model = self->config.model;
@@ -589,11 +656,7 @@ static void correct(pvid_robot_f32 *self, uint8_t joint)
     const float q = self->q[joint] + change;
     const float before_it = self->q[joint];
     self->q[joint] = q;
-    if (q < (FALL * before_it)) {
-        forget(self, joint, 0.0f);
-    } else {
-        forget_noise(self, joint, (q < (AGAIN * before_it)) ? 0.0f : AGING);
-    }
+    self->rounded[joint] = q < (FALL * before_it);
     self->corrected = (uint8_t)(joint + 1u);
 }
 
@@ -608,6 +671,54 @@ static bool take_delta(pvid_robot_f32 *self)
         memory[self->at.next + k] = memory[self->at.p + k] + memory[self->at.delta + k];
     }
     return are_within(&memory[self->at.next], n, ROW_LIMIT);
+}
+
+/* Times the noise in the columns: the variance of the estimate beyond that of columns without. */
+static float wider(const pvid_robot_f32 *self)
+{
+    return 1.0f + (QUADRATIC * self->part);
+}
+
+/* `part` of a joint and of those before it; 1 in place of that of a joint some of whose rows are forgotten. */
+static void end_correction(pvid_robot_f32 *self, uint8_t joint)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    const uint32_t n = (uint32_t)model->end[joint] - first_of(model, joint);
+    float part = 1.0f;
+    if (self->rounded[joint] || (self->rows[joint] >= self->config.memory)) {
+        forget(self, joint, self->rounded[joint] ? 0.0f : 0.5f);
+    } else {
+        float p[PVID_ROBOT_P];
+        for (uint32_t i = 0; i < n; i++) {
+            p[i] = self->memory[self->at.p + model->column[first_of(model, joint) + i]];
+        }
+        const float noise = quadratic(&self->memory[self->at.d + before(model, joint)], p, n) * weight_of(self, joint);
+        part = (noise < (float)self->rows[joint]) ? (noise / (float)self->rows[joint]) : 1.0f;
+    }
+    self->part = ((joint == 0u) || (part > self->part)) ? part : self->part;
+}
+
+/* x = L^-1 e_k, x = A^-1 e_k, its variance: by their number in the last one, two or three ticks. */
+static pvid_reason find_error(pvid_robot_f32 *self, uint32_t k, uint32_t tick)
+{
+    const uint32_t n = self->config.model->p;
+    float *x = &self->memory[self->at.z];
+    const uint32_t ticks = ticks_of_error(n);
+    if (tick == 0u) {
+        memset(x, 0, n * sizeof x[0]);
+        x[k] = 1.0f;
+        forward(&self->memory[self->at.m], x, k, n);
+    }
+    if ((tick + 2u) == ((ticks > 2u) ? ticks : 2u)) {
+        backward(&self->memory[self->at.m], x, n);
+    }
+    if ((tick + 1u) < ticks) {
+        return PVID_ACCUMULATED;
+    }
+    const float noise = quadratic(&self->memory[self->at.noise], x, n);
+    const float error = sqrtf(x[k] + (wider(self) * noise));
+    self->memory[self->at.fresh + n + k] = error;
+    return ((noise <= x[k]) && (error < (KNOWN * self->config.start_sd[k]))) ? PVID_ACCUMULATED : PVID_HELD_UNCERTAIN;
 }
 
 static void publish(pvid_robot_f32 *self)
@@ -630,20 +741,28 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
     pvid_reason held = PVID_ACCUMULATED;
     pvid_reason reason = PVID_ACCUMULATED;
     switch (self->stage) {
-    case FORGET:
-        all = self->config.model->joints;
-        if (self->rows[i] >= self->config.memory) {
-            forget(self, i, 0.5f);
-        }
-        break;
     case ASSEMBLE:
         all = self->config.model->joints;
-        self->factor = false;
-        assemble(self, i);
+        if (i == 0u) {
+            begin_assembly(self);
+        }
+        assemble(self, i, self->at.s, self->at.m);
+        break;
+    case NOISE:
+        all = self->config.model->joints;
+        if (i == 0u) {
+            memset(&memory[self->at.noise], 0, triangle(n) * sizeof memory[0]);
+        }
+        assemble(self, i, self->at.d, self->at.noise);
+        break;
+    case FORCES:
+        all = self->config.model->joints;
+        add_forces(self, i);
         break;
     case FACTOR:
         all = n;
-        held = factor_row(&memory[self->at.m], &memory[self->at.z], i) ? PVID_ACCUMULATED : PVID_HELD_SINGULAR;
+        held = factor_row(&memory[self->at.m], &memory[self->at.noise], &memory[self->at.z], i) ? PVID_ACCUMULATED
+                                                                                                : PVID_HELD_SINGULAR;
         break;
     case BACKWARD:
         held = take_delta(self) ? PVID_ACCUMULATED : PVID_HELD_SINGULAR;
@@ -656,12 +775,13 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
             self->corrected = 0;
         }
         break;
+    case FORGET:
+        all = self->config.model->joints;
+        end_correction(self, i);
+        break;
     case ERRORS:
-        all = n;
-        unit_forward(&memory[self->at.m], &memory[self->at.z], i, n);
-        memory[self->at.fresh + n + i] = sqrtf(product(&memory[self->at.z + i], &memory[self->at.z + i], n - i));
-        held = (memory[self->at.fresh + n + i] < (KNOWN * self->config.start_sd[i])) ? PVID_ACCUMULATED
-                                                                                     : PVID_HELD_UNCERTAIN;
+        all = ticks_of_error(n) * n;
+        held = find_error(self, i / ticks_of_error(n), i % ticks_of_error(n));
         break;
     case PUBLISH:
         self->factor = true;
@@ -684,12 +804,21 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
     return reason;
 }
 
-/* What a free tick does: the row of a joint, else a stage. */
+/* What a free tick does: the row of a joint, what noise changes in it, else a stage. Where an interval has too few free
+ * ticks the first two are one. */
 static pvid_reason do_task(pvid_robot_f32 *self)
 {
     const pvid_robot_model_f32 *model = self->config.model;
-    if (self->row < model->joints) {
-        return add_row(self);
+    if ((self->row % 2u) == 1u) {
+        add_noise(self);
+        return PVID_ACCUMULATED;
+    }
+    if (self->row < (2u * model->joints)) {
+        const pvid_reason reason = add_row(self);
+        if ((reason == PVID_ACCUMULATED) && (ticks_of_rows(self->config.design, model->joints) == model->joints)) {
+            add_noise(self);
+        }
+        return reason;
     }
     if (self->stage != IDLE) {
         return do_stage(self);
@@ -701,7 +830,8 @@ static pvid_reason do_task(pvid_robot_f32 *self)
     if (enough) {
         self->since = 0;
         self->index = 0;
-        self->stage = FORGET;
+        self->stage = ASSEMBLE;
+        self->factor = false;
     }
     return PVID_ACCUMULATED;
 }
@@ -770,10 +900,27 @@ bool pvid_robot_covariance_f32(const pvid_robot_f32 *self, uint8_t k, float out[
     if ((self == NULL) || (self->memory == NULL) || (out == NULL) || !self->factor || (k >= self->config.model->p)) {
         return false;
     }
+    const uint32_t n = self->config.model->p;
     const float *m = &self->memory[self->at.m];
-    memset(out, 0, k * sizeof out[0]);
-    unit_forward(m, out, k, self->config.model->p);
-    backward(m, out, self->config.model->p);
+    const float *row = &self->memory[self->at.noise];
+    float x[PVID_ROBOT_P] = {0.0f};
+    x[k] = 1.0f;
+    forward(m, x, k, n);
+    backward(m, x, n);
+    memset(out, 0, n * sizeof out[0]);
+    for (uint32_t i = 0; i < n; i++) {
+        for (uint32_t j = 0; j < i; j++) {
+            out[i] += row[j] * x[j];
+            out[j] += row[j] * x[i];
+        }
+        out[i] += row[i] * x[i];
+        row = &row[i + 1u];
+    }
+    forward(m, out, 0, n);
+    backward(m, out, n);
+    for (uint32_t i = 0; i < n; i++) {
+        out[i] = x[i] + (wider(self) * out[i]);
+    }
     return true;
 }
 

@@ -135,7 +135,7 @@ class RobotFiles:
         n, p, slots = len(self.chain.joints), len(self.compiled.unknowns), sum(map(len, self.columns))
         triangles = sum(len(one) * (len(one) + 1) // 2 for one in self.columns)
         fixed = 4 * n * taps + 2 * len(self.slots) + 6 * n + 7 * (2 * slots + n)
-        return fixed + triangles + 2 * slots + p * (p + 1) // 2 + 10 * p
+        return fixed + 2 * triangles + slots + p * (p + 1) + 10 * p
 
     def banner(self) -> list[str]:
         """Two lines for the head of a file."""

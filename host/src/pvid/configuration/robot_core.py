@@ -33,12 +33,14 @@ def robot_core_design(model: CompiledModel, recording: Recording) -> RobotCoreDe
     highest = (found.functions.count // 2) / found.functions.length
     ticks = max(int(found.sample_rate / (2 * highest)), n + 2)
     decimation = max(ticks // _STEPS, 1)
-    # As free_ticks of robot_f32.c: an interval has a tick for the row of each joint, and more for the estimate.
+    # As free_ticks and ticks_of_rows of robot_f32.c: an interval has ticks for the rows, and more for the estimate.
     free = max(decimation - 2, 1)
     interval = max(ticks // decimation, -(-(n + 3) // free))
-    stages = 3 * n + 2 * len(model.unknowns) + 4
+    stages = 5 * n + (2 + min(len(model.unknowns) // 10, 2)) * len(model.unknowns) + 4
+    left = interval * free - 1
     group = max(
-        math.ceil(stages / (interval * free - 1 - n)), math.ceil(_GROUP_S * found.sample_rate / (interval * decimation))
+        math.ceil(stages / (left - (2 * n if left > 2 * n else n))),
+        math.ceil(_GROUP_S * found.sample_rate / (interval * decimation)),
     )
     if interval > 255 or decimation > 255:
         raise PvidError(f"{found.sample_rate:g} samples a second are too many for so slow a motion: record fewer")
@@ -67,7 +69,8 @@ def _spline(u: Float) -> tuple[Float, Float]:
 
 
 def _noise(taps: int, rate: float, decimation: int) -> Float:
-    """One period of white noise with sd 1, whose spectrum is flat, behind the polynomials of q and v, at the steps."""
+    """One period of white noise with sd 1, whose spectrum is flat, behind the polynomials of q and v, at the steps,
+    with exactly their mean square."""
     size = _NOISE * decimation
     phases = np.random.default_rng(0).uniform(0, 2 * math.pi, size // 2 + 1)
     phases[[0, -1]] = 0.0
@@ -76,6 +79,7 @@ def _noise(taps: int, rate: float, decimation: int) -> Float:
     for order, gain in enumerate(gains):
         np.add.at(gain, np.arange(-(taps // 2), taps // 2 + 1) % size, polynomial_weights(taps, POLYNOMIAL, order))
     passed = [np.fft.irfft(white * np.conj(np.fft.rfft(gain)), size)[::decimation] for gain in gains]
+    passed = [one * np.linalg.norm(gain) / np.sqrt(np.mean(one**2)) for one, gain in zip(passed, gains, strict=True)]
     return np.concatenate([passed[0], passed[1] * rate])
 
 

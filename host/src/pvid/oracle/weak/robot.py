@@ -9,7 +9,8 @@ steps of a window, the rows of its joint have it in the range of sum chi chi^T o
 
 Noise of the encoders is in the regressors as well, in the rates even squared. What that adds to the normal equations
 S p = F is computed from the run: as much noise is added again, and subtracted, and the mean growth of S and F is taken
-off (simulation extrapolation: J. Cook, L. Stefanski, JASA 89 (1994) 1314).
+off (simulation extrapolation: J. Cook, L. Stefanski, JASA 89 (1994) 1314). The draws of that noise differ in what is
+quadratic in it: as much the recording has, and the mean of the draws has its part. Both are in the covariance.
 """
 
 from __future__ import annotations
@@ -365,6 +366,10 @@ class RobotRows:
         """[n, windows, K]."""
         return np.asarray(self.known - np.einsum("iwpk,p->iwk", self.regressors, p))
 
+    def scores(self, p: Float) -> Float:
+        """What each window has of F - S p [windows, p]."""
+        return np.asarray(np.einsum("iwpk,iwk->wp", self.regressors, self.residuals(p), optimize=True))
+
 
 @dataclass(frozen=True)
 class Lacking:
@@ -399,8 +404,8 @@ class RobotFit:
     uncorrected : p with the noise of the encoders in the regressors [p]
     halves : of the first and of the second half of the windows [2, p]
     apart : their difference over its standard error [p]
-    undetermined : a standard error is worth more than a tenth of the torques, or its column has more noise than motion
-        [p]
+    undetermined : a standard error is worth more than a tenth of the torques, or its direction has more noise than
+        motion [p]
     windows : of the run
     lacking : terms that the equations may lack, one, two, .. together: each time the surest is added, as the last one
     springs : what a spring of 1 N m/rad or N/m at each joint moves p by [n, p]; 0 where p takes too little of it to
@@ -489,11 +494,19 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
             parts[k] = _fitted(left[k].T @ left[k] / (rows.windows * free[k]), grams, roots[k])
     uncorrected = solved(s, f.sum(axis=0))
     more_s, more_f = np.zeros(s.shape), np.zeros(f.shape)
+    drawn = np.zeros((_DRAWS, rows.windows, len(columns)))
     for seed in range(_DRAWS):
         for sign in (1, -1):
-            again = RobotRows.of(whole, columns, seed, sign).white(roots).moments()
+            noisy = RobotRows.of(whole, columns, seed, sign).white(roots)
+            again = noisy.moments()
             more_s += (again[0] - s) / (2 * _DRAWS)
             more_f += (again[1] - f) / (2 * _DRAWS)
+            drawn[seed] += noisy.scores(uncorrected) / 2  # of the pair: what is linear in the noise cancels
+    drawn -= drawn.mean(axis=0)
+    own, before, after = (
+        one.reshape(-1, len(columns)) for one in (drawn, drawn[:, :-1][:, white.next], drawn[:, 1:][:, white.next])
+    )
+    quadratic = (own.T @ own + before.T @ after + after.T @ before) / (_DRAWS - 1)
     corrected = s - more_s
     p = solved(corrected, (f - more_f).sum(axis=0))
     bread = inverse(corrected)
@@ -506,7 +519,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     flat = e.transpose(1, 0, 2).reshape(rows.windows, n * count)
     first, second = flat[:-1][white.next], flat[1:][white.next]
     seen = _scatter(white, flat.T @ flat / len(flat), first.T @ second / max(len(first), 1))
-    covariance = bread @ seen @ bread
+    covariance = bread @ (seen + (1 + 1 / _DRAWS) * quadratic) @ bread
     wanted = np.diag(bread @ _scatter(white, np.eye(n * count), later.reshape(n * count, -1)) @ bread)
     wider = np.sqrt(np.maximum(wanted / np.diag(covariance), 1.0))
     covariance = covariance * np.outer(wider, wider)
@@ -514,7 +527,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     size = np.sqrt(np.diag(covariance) * np.diag(s))
     balanced = np.sum(white.regressors[idle] ** 2, axis=(0, 1, 3)) * p**2  # what cancels where no torque is
     undetermined = ~(size < _COVERED * np.sqrt(np.sum(white.known**2) + np.sum(balanced)))
-    undetermined |= np.diag(corrected) < np.diag(more_s)  # more noise than motion
+    undetermined |= np.diag(bread @ more_s @ bread) > np.diag(bread)  # more noise than motion
     middle = rows.windows // 2
     halves, variances = [], []
     for part in (slice(0, middle), slice(middle, None)):
