@@ -10,6 +10,7 @@ import pytest
 from pvid.base.errors import PvidError
 from pvid.rig.columns import Channel, Columns
 from pvid.rig.csv_table import read_csv
+from pvid.rig.layout import find
 from pvid.rig.table import Table
 
 CHANNELS = (Channel("F", "N"), Channel("x", "m"))
@@ -187,6 +188,14 @@ AROUND: dict[str, tuple[str | bytes, str | None, str]] = {
         "t=X,F=CH1,x=CH2",
         "X counts rows: one each 0.002 s, as line 2 states",
     ),
+    "times in the unit of the stated step": (
+        of(
+            *("Name;rig", "Name;F;x", "SampleTime[ms];2;2", ""),
+            *(f"{2 * k};{f};{x}" for k, (_, f, x) in enumerate(CELLS)),
+        ),
+        "t=1,F=2,x=3",
+        "1 is in ms: a row each 0.002 s, as line 3 states",
+    ),
     "no times, settings beside the names": (
         of("CH1,CH2,t0 = -1.5e+00s, tInc = 2.0e-03,", *(f"{f},{x},," for _, f, x in CELLS)),
         "F=CH1,x=CH2",
@@ -271,6 +280,13 @@ def test_table_is_found_whatever_stands_around_it(case: str, tmp_path: Path) -> 
     found = table(tmp_path, content, columns)
     assert_same(found, {"damaged": (80, 81), "no times, damaged": (9,)}.get(case, ()))
     assert note in "; ".join(found.notes), found.notes
+
+
+def test_names_beside_settings_are_found_where_none_is_sought() -> None:
+    """What `look` reads; the line below the names has a number in each of the settings' columns, the rows have none."""
+    rows = [f"{k},{x},," for k, (_, _, x) in OWN]
+    found = find(["X,CH1,Start,Increment,", "Sequence,VOLT,-3.0e+00,2.0e-03", *rows], ())
+    assert found is not None and (found.names, found.header) == (("X", "CH1", "Start", "Increment"), 1)
 
 
 ABOVE_TIMES = ["time,F,x", "Time (s),F,x", "t_ms,F,x", "Zeit,F,x", "ms,F,x", "n,F,x"]

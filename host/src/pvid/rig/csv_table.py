@@ -150,9 +150,12 @@ class _TextTable:
         is_time_unit = unit_in(columns["t"].name, "s") or scale_to("s", units.get("t", "") or "1")
         if step is not None and not (notes or columns["t"].unit_given or self._time_is_text or is_time_unit):
             clock = TIME.is_called(columns["t"].name) and not layout.beside[0]
-            if not clock and len(body) > 1 and counts_up([cells[self._places["t"]] for cells in body]):
+            times_of_body = [cells[self._places["t"]] for cells in body]
+            if not clock and len(body) > 1 and counts_up(times_of_body):
                 columns, notes = step.of(columns), (f"{columns['t'].name} counts rows: one each {step}",)
                 units.pop("t")
+            elif not clock and (unit := step.unit_of(times_of_body)) is not None:
+                notes, units["t"] = (f"{columns['t'].name} is in {unit}: a row each {step}",), unit
         self._columns, of_units = columns.in_units_of_file(units)
         self._notes = (*_front_note(lines, layout), *notes, *of_units)
         self._sample = body

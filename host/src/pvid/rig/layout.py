@@ -276,7 +276,12 @@ def _with_head(
     """With the names in front of the numbers, and the units; `usual` are lines of the table's width."""
     width = len(usual[0].cells)
     kinds = ["".join(one.kinds[k] for one in usual) for k in range(width)]
-    numbers = [k for k, own in enumerate(kinds) if own.strip("xe") and own.count("x") <= (1 - _MOSTLY) * len(usual)]
+    least = min(2, len(usual))  # a single one is a setting beside the names
+    numbers = [
+        k
+        for k, own in enumerate(kinds)
+        if own.count("n") + own.count("t") >= least and own.count("x") <= (1 - _MOSTLY) * len(usual)
+    ]
     if head is None:
         head = _guessed(lines, _first(usual, numbers), width, numbers)
         if head is not None and not sought[0] and len(head[1]) != width:
@@ -342,8 +347,11 @@ def _guessed(lines: Sequence[_Line], first: int, width: int, numbers: Sequence[i
     for k, one in enumerate(text[:-1]):
         if _units(one, width):
             return text[k + 1], text[k + 1].cells
+    above = [one for one in before if one.number < text[-1].number and not one.is_comment][-1:]
+    for one in above if _has_number(text[-1]) else []:  # settings beside the names
+        if len(one.cells) >= width and not _has_number(one) and not any(one.cells[width:]):
+            return one, one.cells[:width]
     if all(is_unit(cell) for cell in text[-1].cells if cell):  # the names are in a line of another width, or nowhere
-        above = [one for one in before if one.number < text[-1].number and not one.is_comment][-1:]
         for one in above:
             if len(one.cells) > width and not any(one.cells[width:]):
                 return one, one.cells[:width]

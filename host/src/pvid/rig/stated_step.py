@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from statistics import median
 from types import MappingProxyType
 
 from pvid.base.units import scale_to
+from pvid.rig.clock import CLOCKS
 from pvid.rig.columns import Column, Columns
 from pvid.rig.layout import Layout, split
 
@@ -33,6 +36,8 @@ _BARE = re.compile(
 _THOUSANDS = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 _RATE = re.compile(r"(?P<prefix>[kM]?)(?:Hz|Sa?/s|sps|samples/s(?:ec)?|1/s)?", re.I)
 _SAME = 1e-6
+_STEADY = 1e-3  # of a step, in the median of rounded times
+_CLOCKS = ("ms", "us", "ns")
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,15 @@ class Step:
             Column(name, divisor=float(rate), unit_given=True) if whole else Column(name, self.seconds, unit_given=True)
         )
         return replace(columns, named=MappingProxyType({**columns.named, "t": column}))
+
+    def unit_of(self, times: Sequence[str]) -> str | None:
+        """In which cells of the time have this step, where they do not have it in seconds."""
+        try:
+            steps = [float(b) - float(a) for a, b in pairwise(one.replace(",", ".") for one in times)]
+        except ValueError:
+            return None
+        own = median(steps) if steps else 0.0
+        return next((unit for unit in _CLOCKS if abs(own / CLOCKS[unit] / self.seconds - 1) < _STEADY), None)
 
 
 def stated_step(front: Sequence[str], layout: Layout) -> Step | None:

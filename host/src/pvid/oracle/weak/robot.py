@@ -502,6 +502,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
             more_s += (again[0] - s) / (2 * _DRAWS)
             more_f += (again[1] - f) / (2 * _DRAWS)
             drawn[seed] += noisy.scores(uncorrected) / 2  # of the pair: what is linear in the noise cancels
+            del noisy  # its regressors
     drawn -= drawn.mean(axis=0)
     own, before, after = (
         one.reshape(-1, len(columns)) for one in (drawn, drawn[:, :-1][:, white.next], drawn[:, 1:][:, white.next])
