@@ -194,7 +194,7 @@ def test_unit_of_the_time_is_named(name: str, unit: str, scale: float, what: str
 def test_parameter_that_a_ramp_leaves_open_is_no_suspicion_of_units(
     delay: float, wander: float, noise: float, seed: int
 ) -> None:
-    """A motor turns as its voltage rises: its time constant is nowhere seen, so any unit of time or speed may be right."""
+    """A motor turns as its voltage rises: its time constant is nowhere seen, any unit of time or speed may be right."""
     model = Model("motor on a ramp")
     u, w = model.input("u", "V", hold="zoh", reach=12), model.sensor("w", "rad/s", resolution=0.1, reach=100)
     ks, kv, ka = (model.unknown(*of) for of in (("ks", "V", 0.2), ("kv", "V*s", 0.12), ("ka", "V*s^2", 0.02)))

@@ -76,7 +76,7 @@ typedef enum {
     PVID_REJECTED_NOT_FINITE, /* NaN or infinity in the sample or in its row */
     PVID_REJECTED_OUTLIER,    /* a residual far beyond the usual size: gate.h */
     PVID_REJECTED_SATURATED,  /* a row beyond PVID_ROW_LIMIT */
-    PVID_HELD_UNCERTAIN,      /* not published: standard errors too large, too few windows, or p still moving: trust.h */
+    PVID_HELD_UNCERTAIN,      /* not published: too large errors, too few windows, or p still moving: trust.h */
     PVID_HELD_OUT_OF_RANGE,   /* window dropped: a sample exceeded its range */
     PVID_MISFIT, /* p was updated, but the residuals exceed the sensors' noise: the model does not fit the mechanism */
     PVID_HELD_FROZEN, /* row or window not used: the identifier is frozen */
