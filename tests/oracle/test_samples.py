@@ -15,7 +15,7 @@ from pvid.models.drive import RandomSteps
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import Identified, identify
-from pvid.oracle.weak.samples import clipped
+from pvid.oracle.weak.samples import clipped, repeating
 from pvid.sim.simulated_run import RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
@@ -163,3 +163,18 @@ def test_guesses_off_by_one_factor_are_named(factor: float, named: bool) -> None
     assert ("guesses" in found) == named
     if named:
         assert f"L, R and k are all about {factor:.2g} times their guesses: is V in another unit" in found["guesses"]
+
+
+@pytest.mark.parametrize(("counts", "second", "repeats"), [(40, 0.0, True), (100, 0.0, True), (40, 0.6, False)])
+def test_counts_that_repeat_with_the_motion_are_named(counts: int, second: float, repeats: bool) -> None:
+    """Their error looks like motion at harmonics of the tone."""
+    t = np.arange(5000) / 500.0
+    x = np.sin(7.07 * t) + second * np.sin(4.3 * t + 1.0) + second * np.sin(11.9 * t)
+    x *= counts / np.ptp(x)
+    model = Model("m")
+    sensor = model.sensor("x", "m", resolution=1.0)
+    model.equation(model.unknown("k", "1/s", 1.0) * sensor + sensor.d())
+    signal = model.compiled("m").signal("x")
+    assert [one.name for one in repeating(signal, np.rint(x))] == ["counts"] * repeats
+    noisy = np.rint(x + np.random.default_rng(0).normal(0.0, 0.4, len(t)))
+    assert repeating(signal, noisy) == []

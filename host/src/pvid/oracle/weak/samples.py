@@ -1,5 +1,5 @@
-"""What a run's samples and a model show by themselves: a sensor that clips, an encoder that toggles at rest, a sample
-rate that is too low for the fastest mode, guesses that are all off by one factor."""
+"""What a run's samples and a model show by themselves: a sensor that clips, an encoder that toggles at rest or whose
+counts repeat, a sample rate that is too low for the fastest mode, guesses that are all off by one factor."""
 
 from __future__ import annotations
 
@@ -33,6 +33,11 @@ _BLOCK = 50  # samples of a standstill
 _TOGGLES = 0.1  # of the samples of a block that differ from the one before
 _RESTS = 0.2  # of the run
 
+# The spectrum of the counts' error, between these parts of the sample rate: mean square over twice the squared mean. Noise
+# has 0.9 to 1.4 there, as have 26 simulated mechanisms; one tone of 40 to 100 counts has 3 to 11, of 250 up to 3.
+_ABOVE_MOTION, _LINES = 0.2, 2.0
+_FEW_COUNTS = 300  # of the whole motion: with more the error of a count is small
+
 _FASTEST = 1.0  # rate of the fastest mode at the estimate, over the sample rate: above, it passes within a sample
 _FAST_GUESS = 0.3  # the same at the guesses, which must agree
 _EXPLAINED = 0.5  # R^2 of every equation, from which on another rate is advised
@@ -59,7 +64,8 @@ def of_samples(
     out = too_slow(model, samples, sample_rate, fit, r2 > _EXPLAINED)
     for one in model.signals:
         if one.kind == "sensor":
-            out += clipped(model, one, samples) + toggling(model, one, samples[one.name])
+            x = samples[one.name]
+            out += clipped(model, one, samples) + toggling(model, one, x) + repeating(one, x)
         elif chi2_of_sensors(fit) > _MISFIT:
             out += clipped(model, one, samples)
     return out + far_guesses(model, fit)
@@ -135,6 +141,26 @@ def toggling(model: CompiledModel, signal: Signal, x: Float) -> list[Reason]:
         "these samples contain nothing of it. Leave them out."
     )
     return [Reason("resting", text, alarm=False)]
+
+
+def repeating(signal: Signal, x: Float) -> list[Reason]:
+    """Few counts of a motion that repeats: their error repeats with it, as lines at its harmonics.
+
+    The noise of a count is taken as independent of the motion. As lines it is alike in all windows, and looks like motion.
+    """
+    second = np.diff(x, 2)
+    counts = float(np.nanmax(x) - np.nanmin(x)) / signal.resolution if signal.resolution else np.inf
+    if not 0 < counts < _FEW_COUNTS or len(second) < _BLOCK or not np.isfinite(second).all():
+        return []
+    power = np.abs(np.fft.rfft(second * np.hanning(len(second)))) ** 2
+    power = power[round(2 * _ABOVE_MOTION * (len(power) - 1)) :]
+    if np.mean(power**2) < 2 * _LINES * np.mean(power) ** 2:
+        return []
+    text = (
+        f"{signal.name} moves over {counts:.0f} counts, whose error repeats with the motion: it looks like motion, and the "
+        "standard errors do not cover it. Drive with several frequencies or a larger amplitude, or read finer counts."
+    )
+    return [Reason("counts", text)]
 
 
 def _in_signs(psi: sp.Expr) -> set[Jet]:

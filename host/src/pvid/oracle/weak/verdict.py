@@ -38,6 +38,7 @@ Name = Literal[
     "range",
     "clipped",
     "resting",
+    "counts",
     "rate",
     "guesses",
     "sensor",
@@ -85,6 +86,7 @@ _LEAVES: dict[Name, Word] = {
     "unexplained": "not_explained",
     "model_error": "not_explained",
     "unpredicted": "not_explained",
+    "counts": "not_explained",
     "wide": "usable",
 }
 
