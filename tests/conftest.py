@@ -66,6 +66,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--workers") < 1:
+        raise pytest.UsageError("--workers: at least 1")
     keep_freed()
     gc.set_threshold(50_000, 20, 100)  # modules and SymPy's expressions live to the end: 5 % of the time found nothing
     config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and with --long")

@@ -3,8 +3,10 @@ collected once, and each fork takes the next file when it has done one."""
 
 import gc
 import os
+import traceback
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import groupby
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any, NoReturn
@@ -14,8 +16,17 @@ import pytest
 _NUMBER = 2  # bytes of the number of a file
 
 
-class _Told:
-    """What a fork tells the process that collected."""
+@dataclass
+class _Fork:
+    """A process, the test that it has begun, and the error that ended it."""
+
+    pid: int
+    at: str = ""
+    error: str = ""
+
+
+class _Reports:
+    """What a fork sends to the process that collected."""
 
     def __init__(self, config: pytest.Config, to: Connection) -> None:
         self.config, self.to = config, to
@@ -47,7 +58,7 @@ def _fork(session: pytest.Session, items: Iterator[pytest.Item], to: Connection)
     capture.stop_global_capturing()
     capture.start_global_capturing()  # its files are not shared with other forks
     config.pluginmanager.unregister(name="terminalreporter")
-    config.pluginmanager.register(_Told(config, to))
+    config.pluginmanager.register(_Reports(config, to))
     item = next(items, None)
     while item is not None:
         following = next(items, None)
@@ -58,8 +69,8 @@ def _fork(session: pytest.Session, items: Iterator[pytest.Item], to: Connection)
 
 
 def run(session: pytest.Session, workers: int) -> None:
-    """All tests that have been collected; a fork that ends before its tests is a failure."""
-    config, hook = session.config, session.config.hook
+    """All tests that have been collected; a fork that ends before its tests is a failure, and each that it leaves."""
+    config = session.config
     files = [[*of_file] for _, of_file in groupby(session.items, key=lambda item: item.path)]
     numbers, queue = os.pipe()
     os.write(queue, b"".join(k.to_bytes(_NUMBER) for k in range(len(files))))
@@ -68,52 +79,66 @@ def run(session: pytest.Session, workers: int) -> None:
     config.pluginmanager.getplugin("terminalreporter").showfspath = False
     gc.collect()
     gc.freeze()
-    forks: dict[Connection, tuple[int, str]] = {}
+    forks: dict[Connection, _Fork] = {}
+    left = {item.nodeid: item for item in session.items}
     for _ in range(min(workers, len(files))):
         here, there = Pipe(duplex=False)
         pid = os.fork()
         if not pid:
+            for one in (here, *forks):
+                one.close()  # or a send would wait for ever behind the end of the process that reads
             try:
                 _fork(session, _taken(files, numbers), there)
+            except BaseException:
+                there.send(("broke", traceback.format_exc()))
             finally:
                 os._exit(1)
         there.close()
-        forks[here] = (pid, "")
+        forks[here] = _Fork(pid)
     try:
         while forks:
-            _hear(forks, hook, config, wait([*forks]))
+            for ready in wait([*forks]):
+                _receive(ready, forks, config, left)  # type: ignore[arg-type]
             if session.shouldfail or session.shouldstop:
                 os.read(numbers, len(files) * _NUMBER)  # forks end after the file that they are at
     finally:
+        os.read(numbers, len(files) * _NUMBER)
         os.close(numbers)
-        for pid, _ in forks.values():
-            os.waitpid(pid, 0)
+        for connection, fork in forks.items():
+            connection.close()  # a fork that has more to send ends
+            os.waitpid(fork.pid, 0)
     if session.shouldfail:
         raise session.Failed(session.shouldfail)
     if session.shouldstop:
         raise session.Interrupted(session.shouldstop)
+    for nodeid in left:
+        _fail(config, nodeid, "not run: its process ended before")
 
 
-def _hear(forks: dict[Connection, tuple[int, str]], hook: Any, config: pytest.Config, ready: Iterable[Any]) -> None:
-    for one in ready:
-        pid, nodeid = forks[one]
-        try:
-            what, data = one.recv()
-        except EOFError:
-            what, data = "lost", nodeid
-        if what == "runs":
-            forks[one] = (pid, data)
-        elif what == "warning":
-            hook.pytest_warning_recorded.call_historic(kwargs=data)
-        elif what == "report":
-            hook.pytest_runtest_logreport(report=hook.pytest_report_from_serializable(config=config, data=data))
-        else:
-            del forks[one]
-            _, status = os.waitpid(pid, 0)
-        if what == "lost":
-            code = os.waitstatus_to_exitcode(status)
-            why = f"its process ended with {code}; what it had not run yet of its file is lost"
-            place = (nodeid.partition("::")[0], None, nodeid)
-            hook.pytest_runtest_logreport(
-                report=pytest.TestReport(nodeid, place, {}, "failed", longrepr=why, when="call")
-            )
+def _receive(ready: Connection, forks: dict[Connection, _Fork], config: pytest.Config, left: dict[str, Any]) -> None:
+    fork, hook = forks[ready], config.hook
+    try:
+        what, data = ready.recv()
+    except EOFError:
+        what, data = "ended", None
+    if what == "runs":
+        fork.at = data
+    elif what == "broke":
+        fork.error = data
+    elif what == "warning":
+        hook.pytest_warning_recorded.call_historic(kwargs=data)
+    elif what == "report":
+        left.pop(data["nodeid"], None)
+        hook.pytest_runtest_logreport(report=hook.pytest_report_from_serializable(config=config, data=data))
+    else:
+        del forks[ready]
+        _, status = os.waitpid(fork.pid, 0)
+        if what == "ended":
+            left.pop(fork.at, None)
+            _fail(config, fork.at, f"{fork.error}its process ended with {os.waitstatus_to_exitcode(status)}")
+
+
+def _fail(config: pytest.Config, nodeid: str, why: str) -> None:
+    place = (nodeid.partition("::")[0], None, nodeid)
+    report = pytest.TestReport(nodeid, place, {}, "failed", longrepr=why, when="call")
+    config.hook.pytest_runtest_logreport(report=report)

@@ -3,7 +3,7 @@
  *   -plugin qemu_profile.so,entry=A,skip=N,caller=A,caller_end=A,base=A,bytes=N,functions=FILE,out=FILE
  *
  * Counting begins when the instruction at `entry` is executed for the (skip + 1)th time and goes on between each such
- * call and the next instruction of the caller. `functions` is a file with the addresses where functions begin. FILE
+ * call and the next instruction of the caller. `functions` is a file with the addresses where functions begin. `out`
  * gets the lines "calls N" and "longest N", the instructions of the longest call; then "enters A B" for each
  * instruction at A behind which the function at B began; then "address count most", in hexadecimal and decimal, for
  * every instruction from `base` on that was counted: of all calls, and the most in one call of its own function.
@@ -63,7 +63,11 @@ static void begin(uint64_t at)
     while ((k < entries) && ((from[k] != last) || (to[k] != at))) {
         k++;
     }
-    if ((k == entries) && (entries < MOST_ENTRIES)) {
+    if (k == MOST_ENTRIES) {
+        fputs("qemu_profile: more calls than places for them\n", stderr);
+        exit(EXIT_FAILURE);
+    }
+    if (k == entries) {
         from[entries] = last;
         to[entries++] = at;
     }

@@ -38,7 +38,7 @@ ENDS = "import os\n\ndef test_ends():\n    os._exit(3)\n\ndef test_behind():\n  
 
 
 def _run(folder: Path, *options: str, **files: str) -> str:
-    (folder / "conftest.py").write_text(CONFTEST)
+    (folder / "conftest.py").write_text(files.pop("conftest", CONFTEST))
     for name, text in files.items():
         (folder / f"test_{name}.py").write_text(text)
     code = f"import sys, pytest; sys.path.append({str(ROOT / 'tests')!r}); sys.exit(pytest.main())"
@@ -57,7 +57,23 @@ def test_a_failure_is_shown_and_a_process_that_ends_is_one(tmp_path: Path) -> No
     found = _run(tmp_path, good=GOOD, wrong=WRONG, ends=ENDS)
     assert "assert 1 == 2" in found and "shown" in found
     assert "test_ends.py::test_ends - its process ended with 3" in found.replace("FAILED ", "")
-    assert "2 failed, 3 passed" in found and found.endswith("exit 1")
+    assert "test_behind - not run: its process ended before" in found
+    assert "3 failed, 3 passed" in found and found.endswith("exit 1")
+
+
+def test_the_error_that_ends_a_process_is_shown(tmp_path: Path) -> None:
+    found = _run(tmp_path, stops="import pytest\n\ndef test_stops():\n    pytest.exit('no more')\n", good=GOOD)
+    assert "Exit: no more" in found and "1 failed, 3 passed" in found and found.endswith("exit 1")
+
+
+def test_an_error_of_the_process_that_collects_ends_all(tmp_path: Path) -> None:
+    """Reports that it has not read are larger than a pipe."""
+    large = "import pytest\n\n@pytest.mark.parametrize('k', range(20))\ndef test_large(k):\n"
+    large += "    print('x' * 20_000)\n    assert 0\n"
+    raising = CONFTEST + "\ndef pytest_runtest_logreport(report):\n    import os\n    assert os.getpid() != first\n"
+    raising += "\nimport os\nfirst = os.getpid()\n"
+    found = _run(tmp_path, conftest=raising, one=large, other=large)
+    assert found.endswith("exit 3")
 
 
 def test_after_the_first_failure_no_further_file_is_begun(tmp_path: Path) -> None:

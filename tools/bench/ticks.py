@@ -1,4 +1,4 @@
-"""The longest tick of the weak form of every shipped mechanism on a Cortex-M4F: searched, and bounded by the code."""
+"""The longest tick of the weak form of mechanisms on a Cortex-M4F: searched, and bounded by the code."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@
  *   windows V Gamma V,   Gamma the mean of score score^T, or of that and of score before^T + before score^T,
  *
  * whichever gives more: neighbours share half of their samples. A mean gives the newest window the weight 2/(k + 2), k
- * windows before it, but not less than forgetting does. The first windows, at a poor p, say nothing of the scatter at a
+ * windows before it, but not less than forgetting does. The first windows, at a poor p, do not show the scatter at a
  * good one: the means begin anew with a window whose residuals are far below their mean. */
 #include "weak/scores_f32.h"
 

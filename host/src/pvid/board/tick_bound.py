@@ -4,7 +4,8 @@ Every path that the code has counts, run or not: all stages of a window, refusal
 function is a linear program over its basic blocks (implicit path enumeration), with what it calls added. How often a
 loop runs follows from the design (numbers of parameters, channels, harmonics), not from samples, and is read off runs
 in the emulator. A loop that no run enters makes as many passes as those that end at a limit of the same name in the
-source, and where there is none, as the loop with the most passes.
+source, and where there is none, as the loop with the most passes. A call through a pointer leads where it led in runs,
+or, if none made it, to each function whose address the code takes. Interrupts are not in it.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ class _Loop:
     """Edges back to its first block, and whether it lies in no other loop."""
 
     back: set[tuple[int, int]]
+    body: set[int]
     outermost: bool
 
 
@@ -92,14 +94,29 @@ def tick_bound(
     run : of this image, counted in the emulator
     limits : of loops that no run enters, by their names in the source, where the design gives them
     """
-    functions = _functions(output_of(f"{tool_prefix}objdump", "-d", str(image)))
+    disassembly = output_of(f"{tool_prefix}objdump", "-d", str(image))
+    functions = _functions(disassembly)
     names = {at: name for at, (name, _) in functions.items()}
     pointed = pointed_to(tool_prefix, image, tree, names)
     entered: dict[int, set[int]] = defaultdict(set)
     for at, to in run.enters:
         entered[at].add(to)
     loops = {at: _loops(at, blocks) for at, (_, blocks) in functions.items()}
-    assumed = _assumed(f"{tool_prefix}addr2line", image, functions, loops, run.most, limits)
+    begin = next((at for at, name in names.items() if name == entry), None)
+    if begin is None:
+        raise PvidError(f"the image has no function {entry}")
+    reached, ahead = set[int](), [begin]
+    while ahead:
+        at = ahead.pop()
+        if at in functions and at not in reached:
+            reached.add(at)
+            calls = [one for block in functions[at][1].values() for one in block.calls]
+            ahead += [to for place, what in calls for to in ({what} if what is not None else entered[place] or pointed)]
+    most = dict(run.most)
+    for at in reached:
+        words = max(_words(disassembly, names[at], {names[one] for one in reached}), default=0)
+        most |= {head: max(most[head], words) for head in loops[at] if head in most}
+    assumed = _assumed(f"{tool_prefix}addr2line", image, functions, loops, most, limits)
     bounds: dict[int, int] = {}
     under_way: set[int] = set()
     cut: set[int] = set()  # no function calls itself (tools/loops.py): a pointer would lead to another function
@@ -118,7 +135,7 @@ def tick_bound(
             begin: len(block.places) + sum(max(map(bound_of, called(*one)), default=0) for one in block.calls)
             for begin, block in blocks.items()
         }
-        longest = _longest_path(at, blocks, costs, loops[at], run.most, assumed)
+        longest = _longest_path(at, blocks, costs, loops[at], most, assumed)
         under_way.remove(at)
         cut.discard(at)
         if not cut:
@@ -128,15 +145,12 @@ def tick_bound(
     def called(place: int, what: int | None) -> set[int]:
         return {what} if what is not None else entered[place] or pointed
 
-    begin = next((at for at, name in names.items() if name == entry), None)
-    if begin is None:
-        raise PvidError(f"the image has no function {entry}")
     bound = bound_of(begin)
     heads = {head for at in bounds for head in loops[at]}
     return TickBound(
         bound,
         run.longest,
-        {head: run.most[head] for head in heads if head in run.most},
+        {head: most[head] for head in heads if head in most},
         {head: assumed[head] for head in heads if head in assumed},
     )
 
@@ -165,7 +179,13 @@ def _longest_path(
     capped: list[tuple[int, int, float]] = []
     for head, columns in into.items():
         each = passes.get(head, 0) or assumed[head]
-        capped += [(len(limits), k, 1.0 if again else 1.0 - each) for k, again in columns]
+        body = loops[head].body
+        capped += [(len(limits), k, 1.0) for k, again in columns if again]
+        capped += [
+            (len(limits), k, float((to == head) - each))
+            for k, (at, to) in enumerate(edges)
+            if to in body and at not in body
+        ]
         limits.append(0.0)
         if head in passes:
             capped += [(len(limits), k, 1.0) for k, _ in columns]
@@ -187,6 +207,20 @@ def _longest_path(
     if not found.success:
         raise PvidError(f"no longest path through the function at {begin:x}: {found.message}")
     return int(np.ceil(-found.fun - 1e-6))
+
+
+def _words(disassembly: str, name: str, callers: set[str]) -> Iterator[int]:
+    """How many words calls of memset or memcpy fill, where their size is a constant: a run may have made others."""
+    if name not in ("memset", "memcpy"):
+        return
+    function, size = "", 0
+    for line in disassembly.splitlines():
+        if header := _FUNCTION.match(line):
+            function, size = header[2], 0
+        elif constant := re.search(r"\tmov(?:s|w|\.w)\s+r2, #(\d+)", line):
+            size = int(constant[1])
+        elif function in callers and line.endswith(f" <{name}>"):
+            yield (size + 3) // 4
 
 
 # ---- loops ----
@@ -214,7 +248,7 @@ def _loops(begin: int, blocks: _Blocks) -> dict[int, _Loop]:
             before[to].add(at)
     bodies = {head: _body(head, {at for at, _ in edges}, before) for head, edges in back.items()}
     return {
-        head: _Loop(edges, not any(head in body for other, body in bodies.items() if other != head))
+        head: _Loop(edges, bodies[head], not any(head in body for other, body in bodies.items() if other != head))
         for head, edges in back.items()
     }
 
@@ -295,7 +329,8 @@ def _functions(disassembly: str) -> dict[int, tuple[str, _Blocks]]:
         if start is not None and (header := _FUNCTION.match(lines[start])):
             begin = int(header[1], 16)
             found[begin] = header[2], _blocks(begin, lines[start + 1 :])
-    return {begin: one for begin, one in found.items() if one[1]}  # constants beside the code have no blocks
+    # constants beside the code have no blocks
+    return {begin: (name, _reachable(begin, blocks)) for begin, (name, blocks) in found.items() if blocks}
 
 
 def _table(base: int, data: dict[int, int], width: int) -> set[int]:
@@ -323,7 +358,7 @@ def _blocks(begin: int, lines: list[str]) -> _Blocks:
     starts = {begin} | {to for targets, _, _, _ in leads.values() for to in targets}
     blocks: _Blocks = {}
     here = begin
-    ended = False
+    ended, end = False, begin
     for at, (size, _, _) in code.items():
         targets, ends, call, falls = leads[at]
         if at in starts or ended:
@@ -339,7 +374,22 @@ def _blocks(begin: int, lines: list[str]) -> _Blocks:
         if ended:
             block.next |= targets | ({at + size} if falls and at + size in code else set())
             block.ends |= ends
+        end = at + size
+    if code and not ended:  # into what stands behind it
+        blocks[here].ends = True
+        blocks[here].calls.append((end, end))
     return blocks
+
+
+def _reachable(begin: int, blocks: _Blocks) -> _Blocks:
+    """Without what fills the place behind a function."""
+    found, ahead = set[int](), [begin]
+    while ahead:
+        at = ahead.pop()
+        if at not in found:
+            found.add(at)
+            ahead += blocks[at].next
+    return {at: block for at, block in blocks.items() if at in found}
 
 
 def _leads(
@@ -348,7 +398,10 @@ def _leads(
     """Of an instruction: where in the function it may lead besides the next one, whether it may leave, what it calls
     on the way (None: through a pointer), and whether the next one may follow."""
     if mnemonic in ("tbb", "tbh"):
-        return {to for to in _table(at + size, data, 1 if mnemonic == "tbb" else 2) if to in code}, False, None, False
+        table = {to for to in _table(at + size, data, 1 if mnemonic == "tbb" else 2) if to in code}
+        if not table:
+            raise PvidError(f"a switch without a table at {at:x}: {mnemonic} {operands}")
+        return table, False, None, False
     to = re.search(r"\b([0-9a-f]+) <", operands)
     target = int(to[1], 16) if to else None
     if match := _BRANCH.match(mnemonic):
@@ -362,6 +415,8 @@ def _leads(
         mnemonic.startswith("bx")
         or re.search(r"\bpc\b", operands.partition(",")[0] if mnemonic.startswith("ldr") else operands)
     ):
+        if mnemonic.startswith("ldr") and "[sp" not in operands:
+            raise PvidError(f"a transfer that is not understood at {at:x}: {mnemonic} {operands}")
         pointer = mnemonic.startswith("bx") and operands != "lr"
         return set(), True, (None,) if pointer else None, bool(match["if"])
     if re.match(r"^(mov|add|sub)\w*(\.w)?$", mnemonic) and operands.startswith("pc,"):

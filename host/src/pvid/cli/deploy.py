@@ -43,7 +43,8 @@ _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "am
 @click.option(
     "--ticks",
     type=click.IntRange(1),
-    help="Most instructions of a tick of the first stage on a Cortex-M4F, whatever the samples: the same.",
+    help="Most instructions of a tick of the first stage on a Cortex-M4F: fewer test functions if needed. Needs "
+    "pvid's repository, arm-none-eabi-gcc and QEMU.",
 )
 @force_option
 def command(
