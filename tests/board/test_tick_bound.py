@@ -22,7 +22,7 @@ def test_no_tick_of_another_search_is_longer_than_the_bound(name: str, core: Cor
     run = mechanism_run(name, long=True) if core == "f32" else fixed_run(name, long=True)
     found, other = longest_tick(BOARD, run), longest_tick(BOARD, run, seed=1)
     assert found.longest <= found.bound and other.longest <= found.bound
-    most = found.assumed | found.passes
+    most = {**found.assumed, **found.passes}
     assert not {head: n for head, n in other.passes.items() if n > most[head]}
 
 

@@ -16,6 +16,7 @@
  * Noise of the encoders is in the columns, too: a part d of a row adds d d^T to S and moves F by -d (d p) in the mean.
  * As much noise is therefore added again, from a table of one period. What that changes in a row is such a d: with
  * D_i = sum d d^T the equation is A dp = sum_i (F_i + D_i p) / s_i^2 + prior, A = sum_i (S_i - D_i) / s_i^2 + prior.
+ * Of a column with a share, as a friction that reverses, D_i p has that share alone: it settles over some groups.
  *
  * Errors are of A^-1 (A + (1 + 4 r) D) A^-1, D = sum_i D_i / s_i^2: of S e, and of d (d p), whose variance for Gaussian
  * d of covariance C is C (p^T C p) + C p p^T C, at most 2 C p^T C p; both the noise and what is added again have it,
@@ -32,7 +33,8 @@
  * sample behind it is in no later row. Four outliers of a joint within 64 of its rows open the gate until as many rows
  * are accepted: a changed plant is followed. Not caught: a bad sample before the first estimate, while a joint has less
  * than 2 p / n + 1 rows or its gate is open, one that moves every row by less than 16 s_i, and the rows of the joints
- * before the one that shows it. What is not caught stays until `memory` rows have passed several times, or init.
+ * before the one that shows it. A joint that rests for much of the time has a wrong friction. What is not caught stays
+ * until `memory` rows have passed several times, or init.
  *
  * Never allocates: all that depends on the model is in `memory`, and no PVID_MAX_ size matters. Every input is allowed.
  * Call all functions from one context, except pvid_robot_read_f32.

@@ -28,7 +28,7 @@
 #define MOST_ROWS 1048576u
 #define MOST_TICKS 65535u /* of an interval */
 
-enum { IDLE, ASSEMBLE, NOISE, FORCES, FACTOR, BACKWARD, CORRECT, FORGET, ERRORS, PUBLISH };
+enum { IDLE, ASSEMBLE, NOISE, FORCES, FACTOR, BACKWARD, CORRECT, PART, ERRORS, PUBLISH };
 
 /* Entries of a packed triangle of n rows: row i begins at triangle(i). */
 static inline uint32_t triangle(uint32_t n)
@@ -442,7 +442,7 @@ static pvid_reason add_row(pvid_robot_f32 *self)
         pvid_count_up(&self->saturated);
         return PVID_REJECTED_SATURATED;
     }
-    if ((self->number > 0u) && has_rows(self, joint) && (self->doubt[joint] < OPEN) &&
+    if ((self->number > 0u) && has_rows(self, joint) && (self->doubt[joint] < OPEN) && !self->rounded[joint] &&
         ((e * e * free_rows(self, joint)) > (GATE * self->q[joint]))) {
         self->doubt[joint] += DOUBT;
         pvid_count_up(&self->outliers);
@@ -679,14 +679,15 @@ static float wider(const pvid_robot_f32 *self)
     return 1.0f + (QUADRATIC * self->part);
 }
 
-/* `part` of a joint and of those before it; 1 in place of that of a joint some of whose rows are forgotten. */
+/* `part` of a joint and of those before it; 1 in place of that of a joint that begins again. */
 static void end_correction(pvid_robot_f32 *self, uint8_t joint)
 {
     const pvid_robot_model_f32 *model = self->config.model;
     const uint32_t n = (uint32_t)model->end[joint] - first_of(model, joint);
     float part = 1.0f;
-    if (self->rounded[joint] || (self->rows[joint] >= self->config.memory)) {
-        forget(self, joint, self->rounded[joint] ? 0.0f : 0.5f);
+    if (self->rounded[joint]) {
+        forget(self, joint, 0.0f);
+        self->rounded[joint] = false;
     } else {
         float p[PVID_ROBOT_P];
         for (uint32_t i = 0; i < n; i++) {
@@ -775,7 +776,7 @@ static pvid_reason do_stage(pvid_robot_f32 *self)
             self->corrected = 0;
         }
         break;
-    case FORGET:
+    case PART:
         all = self->config.model->joints;
         end_correction(self, i);
         break;
@@ -824,8 +825,12 @@ static pvid_reason do_task(pvid_robot_f32 *self)
         return do_stage(self);
     }
     bool enough = self->since >= ((uint32_t)self->config.group * model->joints);
-    for (uint8_t j = 0; enough && (j < model->joints); j++) {
-        enough = has_rows(self, j);
+    for (uint8_t j = 0; j < model->joints; j++) {
+        if (self->rows[j] >= self->config.memory) { /* whether or not estimates are held */
+            forget(self, j, 0.5f);
+            return PVID_ACCUMULATED;
+        }
+        enough = enough && has_rows(self, j);
     }
     if (enough) {
         self->since = 0;

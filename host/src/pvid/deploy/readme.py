@@ -83,7 +83,8 @@ def _ticks(d: Deployment) -> str:
         return "`pvid deploy --ticks N` bounds the instructions of a tick and the stack on a Cortex-M4F."
     return (
         f"On a Cortex-M4F (gcc -O2) a tick of the first stage takes at most {d.most.bound} instructions without "
-        f"interrupts, by its code (firmware.md, Guarantees), and took {d.most.longest} in a search with spoilt samples; the stack is at most {d.most.stack} bytes."
+        f"interrupts, by its code (firmware.md, Guarantees), and took {d.most.longest} in a search with spoilt "
+        f"samples; the stack is at most {d.most.stack} bytes."
     )
 
 

@@ -148,6 +148,7 @@ class _Factors(NamedTuple):
 
 def _distance(answer: Analysis, p: Float, se: Float) -> _Factors:
     positive, guess = np.array([(one.positive, one.guess) for one in answer.model.unknowns]).T
+    se = np.where(np.isnan(se), 0.0, se)
     ends = p - 2 * se, p + 2 * se
 
     def largest(*tried: Float) -> float:

@@ -33,7 +33,7 @@ from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.identify import Identified, ready
 from pvid.oracle.weak.rows import WeakRows
-from pvid.oracle.weak.solve import COMPARED, PASSES_COMPARED, Fit
+from pvid.oracle.weak.solve import COMPARED, Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.oracle.weak.words import worst
 from pvid.rig.run import Recording
@@ -401,7 +401,7 @@ class _Fitted:
     compensate: bool
 
     def __call__(self, rows: WeakRows, start: Float) -> Fit:
-        return gated(rows, start, self.equation_error, self.compensate, PASSES_COMPARED, COMPARED)
+        return gated(rows, start, self.equation_error, self.compensate, settled=COMPARED)
 
     def half(self, rows: WeakRows, parts: Sequence[Stretch], fit: Fit) -> Float:
         """p from the windows within these parts; that of the whole where they are too few."""

@@ -154,8 +154,12 @@ class _TextTable:
             if not clock and len(body) > 1 and counts_up(times_of_body):
                 columns, notes = step.of(columns), (f"{columns['t'].name} counts rows: one each {step}",)
                 units.pop("t")
-            elif not clock and (unit := step.unit_of(times_of_body)) is not None:
-                notes, units["t"] = (f"{columns['t'].name} is in {unit}: a row each {step}",), unit
+            elif (unit := step.unit_of(times_of_body)) is not None:
+                name = columns["t"].name
+                if clock:
+                    notes = (f"{name} is taken in s; in {unit}, --columns t={name}:{unit}, a row would be each {step}",)
+                else:
+                    notes, units["t"] = (f"{name} is in {unit}: a row each {step}",), unit
         self._columns, of_units = columns.in_units_of_file(units)
         self._notes = (*_front_note(lines, layout), *notes, *of_units)
         self._sample = body

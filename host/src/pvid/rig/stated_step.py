@@ -37,7 +37,7 @@ _THOUSANDS = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 _RATE = re.compile(r"(?P<prefix>[kM]?)(?:Hz|Sa?/s|sps|samples/s(?:ec)?|1/s)?", re.I)
 _SAME = 1e-6
 _STEADY = 1e-3  # of a step, in the median of rounded times
-_CLOCKS = ("ms", "us", "ns")
+_UNITS = ("ms", "us", "ns")
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,9 @@ class Step:
             steps = [float(b) - float(a) for a, b in pairwise(one.replace(",", ".") for one in times)]
         except ValueError:
             return None
-        own = median(steps) if steps else 0.0
-        return next((unit for unit in _CLOCKS if abs(own / CLOCKS[unit] / self.seconds - 1) < _STEADY), None)
+        tried = (median(steps), sum(steps) / len(steps)) if steps else ()  # the mean of rounded ones
+        units = (unit for unit in _UNITS for own in tried if abs(own / CLOCKS[unit] / self.seconds - 1) < _STEADY)
+        return next(units, None)
 
 
 def stated_step(front: Sequence[str], layout: Layout) -> Step | None:

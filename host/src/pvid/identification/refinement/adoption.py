@@ -34,7 +34,17 @@ _HALF_OF_RANGE = 0.5  # of the standard deviation of a guess: a larger standard 
 _SHOWN = 3  # times of jumps
 _APART = 3.0  # standard errors of the difference: two answers that differ by more do
 # Reasons about the recording itself, which hold for any estimate from it.
-_OF_RECORDING: tuple[Name, ...] = ("clipped", "resting", "counts", "rate", "feedback", "sensor", "scale", "guesses", "core")
+_OF_RECORDING: tuple[Name, ...] = (
+    "clipped",
+    "resting",
+    "counts",
+    "rate",
+    "feedback",
+    "sensor",
+    "scale",
+    "guesses",
+    "core",
+)
 
 
 def refined_answer(answer: Analysis) -> tuple[Analysis, RefinedMechanism | None, str]:

@@ -1,8 +1,8 @@
 """The course of parameters that drift along given directions alone, from all windows of a run: theory.md 4, (6d), (6e).
 
-Forwards what the windows contain along D grows old, as in the core, which lets each kind of rows forget by itself.
-Backwards each window gets what the later ones contain: the smoother of the random walk that the law assumes. All windows
-are linearised about the course before, so that D may turn.
+Forwards what the windows contain along D grows old, as in the core, where each kind of rows forgets by itself; then
+each window gets, backwards, what the later ones contain: the smoother of the random walk that the law assumes. All
+windows are linearised about the course before, so that D may turn.
 """
 
 from __future__ import annotations

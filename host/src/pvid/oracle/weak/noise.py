@@ -117,7 +117,8 @@ def slope_of(g: Float, reach: int, dt: float) -> Float:
 
 def _within(expression: sp.Expr) -> list[tuple[Jet, int, sp.Expr]]:
     """Jets in a signal that is made of running integrals, how often each is differentiated (negative: integrated), and
-    the signal's slope; of an integral inside a curve nothing."""
+    the signal's slope; of an integral inside a curve nothing. Of an integrand that is no line it is the slope at the
+    time of the row, not of the sample: an approximation."""
     marks = {one: sp.Dummy() for one in sorted(expression.atoms(Integral), key=sp.default_sort_key)}
     outside = expression.xreplace(marks)
     found = [(jet, jet.order, sp.diff(outside, jet)) for jet in sorted(jets(outside), key=str)]

@@ -33,8 +33,8 @@ _BLOCK = 50  # samples of a standstill
 _TOGGLES = 0.1  # of the samples of a block that differ from the one before
 _RESTS = 0.2  # of the run
 
-# The spectrum of the counts' error, between these parts of the sample rate: mean square over twice the squared mean. Noise
-# has 0.9 to 1.4 there, as have 26 simulated mechanisms; one tone of 40 to 100 counts has 3 to 11, of 250 up to 3.
+# The spectrum of the counts' error above this part of the sample rate: mean square over twice the squared mean. Noise
+# has 0.9 to 1.4 there, as have 14 simulated mechanisms; one tone of 40 to 100 counts has 3 to 11, of 250 up to 3.
 _ABOVE_MOTION, _LINES = 0.2, 2.0
 _FEW_COUNTS = 300  # of the whole motion: with more the error of a count is small
 
@@ -146,7 +146,7 @@ def toggling(model: CompiledModel, signal: Signal, x: Float) -> list[Reason]:
 def repeating(signal: Signal, x: Float) -> list[Reason]:
     """Few counts of a motion that repeats: their error repeats with it, as lines at its harmonics.
 
-    The noise of a count is taken as independent of the motion. As lines it is alike in all windows, and looks like motion.
+    The noise of a count is taken as independent of the motion. As lines it is alike in all windows and looks like it.
     """
     second = np.diff(x, 2)
     counts = float(np.nanmax(x) - np.nanmin(x)) / signal.resolution if signal.resolution else np.inf
@@ -157,8 +157,9 @@ def repeating(signal: Signal, x: Float) -> list[Reason]:
     if np.mean(power**2) < 2 * _LINES * np.mean(power) ** 2:
         return []
     text = (
-        f"{signal.name} moves over {counts:.0f} counts, whose error repeats with the motion: it looks like motion, and the "
-        "standard errors do not cover it. Drive with several frequencies or a larger amplitude, or read finer counts."
+        f"{signal.name} moves over {counts:.0f} counts, whose error repeats with the motion: it looks like motion, and "
+        "the standard errors do not cover it. Drive with several frequencies or a larger amplitude, or read finer "
+        "counts."
     )
     return [Reason("counts", text)]
 

@@ -192,7 +192,7 @@ class Fit:
     Attributes
     ----------
     p : [n_p]
-    rows, white : the windows; whitened at p
+    rows, white : the windows; whitened at p, or where its last, tiny step began
     errors : of each row kind
     start : where the search began
     settled : the last step was tiny
