@@ -573,7 +573,7 @@ static float product(const float x[], const float y[], uint32_t n)
 static bool factor_row(float m[], const float d[], float z[], uint32_t i)
 {
     float *row = &m[triangle(i)];
-    for (uint32_t j = 0; j <= i; j++) {
+    for (uint32_t j = 0; j < (i + 1u); j++) {
         row[j] -= d[triangle(i) + j];
     }
     const float diagonal = row[i];
