@@ -13,7 +13,7 @@ from pvid.oracle.weak.solve import RIDGE, Fit, inverse, of_fit
 
 _NOISE_SHARE = 0.1  # of the information along a direction, below which its standard error is that of the whole
 _CHANCE = 3.0  # standard deviations of that share
-_ZERO = 1.5  # resolutions, within which the zero of a sensor is known
+_ZERO = 0.5  # resolutions, to which a sensor that rounds shows where its zero is
 
 
 @dataclass(frozen=True)
