@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.rows import EquationError, WeakRows, record_of
+from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.solve import RIDGE, Fit, inverse, of_fit
 
 _NOISE_SHARE = 0.1  # of the information along a direction, below which its standard error is that of the whole
 _CHANCE = 3.0  # standard deviations of that share
-_ZERO = 0.5  # resolutions, to which a sensor that rounds shows where its zero is
 
 
 @dataclass(frozen=True)
@@ -143,35 +141,6 @@ def of_noise(fit: Fit) -> Float:
     return out
 
 
-def _of_zeros(fit: Fit, least: float) -> Float:
-    """The part of the information that the zeros of sensors make, if they are off by `_ZERO` resolutions [n_p, n_p].
-
-    A tone of few counts, a fraction of a count off, says that a spring's force of that fraction is 0: its stiffness is.
-
-    Parameters
-    ----------
-    least : eigenvalue of the information, of columns of length 1: beside it what a zero makes may be nothing
-    """
-    grid, theta = fit.rows.record.grid, fit.parameters.theta(fit.p)
-    before, out = fit.designs(), np.zeros((len(fit.p), len(fit.p)))
-
-    def moved(name: str, x: Float) -> list[Float] | None:
-        rows = WeakRows(fit.rows.compiled, record_of(fit.rows.compiled, {**grid.given, name: x}, grid.design))
-        rows = rows.only(np.isin(rows.numbers, fit.rows.numbers))
-        if rows.windows != fit.rows.windows:
-            return None
-        white = [rows.white(one, theta, fit.errors) for one in rows.groups]
-        return replace(fit, rows=rows, white=white).designs()
-
-    for one in fit.rows.compiled.bare.signals:
-        x, zero = grid.given.get(one.name), _ZERO * one.resolution
-        if one.kind == "sensor" and x is not None and len(fit.p) * zero**2 > _NOISE_SHARE * least * np.nanmean(x**2):
-            after = attempted(lambda name=one.name, x=x + zero: moved(name, x))  # type: ignore[misc]
-            if after is not None:
-                out += _of_rows([b - a for a, b in zip(before, after, strict=True)])
-    return out
-
-
 def _spread_of_noise(fit: Fit, step: Float) -> float:
     """Relative standard deviation of the information that noise makes along a step [n_p]: few rows may have most."""
     jacobian, total, squares = fit.parameters.jacobian(fit.p), 0.0, 0.0
@@ -190,7 +159,7 @@ def without_motion(fit: Fit, designs: list[Float]) -> Float:
     With v^T S v = 1 and S_n v = lambda S v, S the information of the rows and S_n its part of the noise, the scores,
     which are compensated for noise, move p by 1 / (1 - lambda) of what S^-1 gives along v. Where 1 - lambda is within
     chance, nothing moves along v, and p may be anywhere on that line: its deviation there takes one parameter as far as
-    its size. Parts below `_NOISE_SHARE` are left as they are. What the zeros of sensors make is no motion either.
+    its size. Parts below `_NOISE_SHARE` are left as they are.
 
     Parameters
     ----------
@@ -200,15 +169,13 @@ def without_motion(fit: Fit, designs: list[Float]) -> Float:
     basis = np.diag(1 / unit) if fit.tangent is None else fit.tangent
     s, by_noise = (basis.T @ one @ basis for one in (_of_rows(designs), of_noise(fit)))
     scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
-    scaled = s * np.outer(scale, scale) + RIDGE * np.eye(len(s))
-    by_zeros = basis.T @ _of_zeros(fit, float(np.linalg.eigvalsh(scaled)[0])) @ basis
-    root = np.linalg.cholesky(scaled)
-    better = _chi2(fit, fit.residuals()) * (1 + _CHANCE * np.sqrt(2 / _free(fit)))  # sensors than declared
-    none = (min(1.0, better) * by_noise + by_zeros) * np.outer(scale, scale)
-    half = np.linalg.solve(root, np.linalg.solve(root, none).T)
+    root = np.linalg.cholesky(s * np.outer(scale, scale) + RIDGE * np.eye(len(s)))
+    half = np.linalg.solve(root, np.linalg.solve(root, by_noise * np.outer(scale, scale)).T)
     share, turned = np.linalg.eigh((half + half.T) / 2)
     if share[-1] < _NOISE_SHARE:
         return np.zeros((len(unit), len(unit)))
+    better = _chi2(fit, fit.residuals()) * (1 + _CHANCE * np.sqrt(2 / _free(fit)))  # sensors than declared
+    share *= min(1.0, better)
     there = share >= _NOISE_SHARE
     steps = (basis * scale) @ np.linalg.solve(root.T, turned[:, there])
     v, rest = unit[:, np.newaxis] * steps, 1 - share[there]
