@@ -15,8 +15,10 @@ from pvid.configuration.weak_tables import circle_of, config_of, design_tables, 
 from pvid.core.weak_native import WeakIdentifier, WeakNative
 from pvid.models import mechanisms
 from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.weak.channels import Record as OfRun
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.noise import Gain, NoiseFilters, NoiseModel
 from pvid.oracle.weak.rows import WeakRows
 from pvid.settings.parts import EstimatorConfig
 from pvid.settings.record import Record
@@ -29,6 +31,17 @@ Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 
 FUNCTIONS = 24  # where the rig's design does not give a number
+
+
+class _WithoutWalks(NoiseFilters):
+    def gains(self, record: OfRun) -> list[dict[str, list[Gain]]]:
+        found = super().gains(record)
+        return [{name: [one for one in own if one.order >= 0] for name, own in row.items()} for row in found]
+
+
+def noise_in_c(rows: WeakRows) -> NoiseModel:
+    """The identifier's: it has no noise of running integrals."""
+    return NoiseModel(_WithoutWalks(rows.compiled.channels), rows.record)
 
 
 @dataclass(frozen=True)

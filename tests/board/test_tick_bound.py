@@ -3,15 +3,13 @@
 import pytest
 
 from bench.figures import results_of
+from bench.ticks import BOARD, HEADER
 from pvid.base.errors import PvidError
-from pvid.board.boards import BOARDS
 from pvid.board.longest_tick import longest_tick
 from pvid.board.mechanism_image import mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.tick_bound import _Block, _functions, _longest_path, _loops
 from pvid.settings.enums import Core
-
-BOARD = BOARDS["mps2-an386"]
 
 
 @pytest.mark.by_day(2)
@@ -28,6 +26,7 @@ def test_no_tick_of_another_search_is_longer_than_the_bound(name: str, core: Cor
 
 def test_the_bound_of_a_table_is_beyond_its_search() -> None:
     shown = results_of("ticks")
+    assert shown.header == HEADER
     columns = [list(map(int, shown.column(one))) for one in ("searched", "bound", "stack bound")]
     assert all(0 < row[0] <= row[1] < 16 * row[0] and row[2] > 0 for row in zip(*columns, strict=True))
 

@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 from weak_forms import NAMES, WeakForm, weak_form
+from weak_rig import noise_in_c
 
 from pvid.base.errors import PvidError
 from pvid.codegen.generated import GeneratedModel
@@ -154,7 +155,7 @@ def test_noise_by_harmonics_is_the_covariance_of_the_rows(name: str) -> None:
         assert np.all(spectrum[1:] > 0) and spectrum[0] >= 0  # 0: all noise of the row is that of derivatives
         energy = functions.hop * np.concatenate([2 * spectrum[:1], np.repeat(spectrum[1:], 2)])
         covariance = basis.T @ (energy[:, None] * basis)
-        oracle = rows.noise.covariance(kind, theta[kind], kind, theta[kind])
+        oracle = noise_in_c(rows).covariance(kind, theta[kind], kind, theta[kind])
         scale = np.sqrt(np.diag(oracle))
         assert np.max(np.abs(covariance - oracle) / np.outer(scale, scale)) < 1e-5
 

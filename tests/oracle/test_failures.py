@@ -85,7 +85,7 @@ def _diverging_after(passes: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_search_that_runs_away_gives_its_last_estimate_with_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = WeakRows.of(ready(cart()), run(), DESIGN)
-    _diverging_after(3, monkeypatch)
+    _diverging_after(2, monkeypatch)
     with pytest.raises(DivergedError) as raised:
         batch(rows)
     fit = raised.value.fit
@@ -93,7 +93,7 @@ def test_a_search_that_runs_away_gives_its_last_estimate_with_the_error(monkeypa
 
 
 def test_a_fit_that_runs_away_is_not_identified_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    _diverging_after(3, monkeypatch)
+    _diverging_after(2, monkeypatch)
     found = identify(cart(), run(), RATE, design=DESIGN)
     assert found.verdict.status == "not_identified"
     assert "ran away" in found.verdict.reasons[0].text
@@ -102,8 +102,8 @@ def test_a_fit_that_runs_away_is_not_identified_with_its_reason(monkeypatch: pyt
 def test_weights_without_a_fixed_point_leave_the_answer_of_the_sensors_weights(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = gated
 
-    def unsettled(rows: WeakRows, start: Float | None, equation_error: bool, *rest: Any) -> solve.Fit:
-        fit = plain(rows, start, equation_error, *rest)
+    def unsettled(rows: WeakRows, start: Float | None, equation_error: bool, *rest: Any, **named: Any) -> solve.Fit:
+        fit = plain(rows, start, equation_error, *rest, **named)
         return replace(fit, p=1e-6 * fit.p, settled=False) if equation_error else fit
 
     monkeypatch.setattr(module, "gated", unsettled)

@@ -2,27 +2,17 @@
 
 import numpy as np
 import pytest
-from weak_rig import weak_rig
+from weak_rig import noise_in_c, weak_rig
 
 from pvid.base.errors import PvidError
 from pvid.configuration.weak_tables import design_tables
 from pvid.oracle.weak import rows
-from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.errors import uncertainty
-from pvid.oracle.weak.noise import Gain, NoiseFilters, NoiseModel
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.solve import batch
 
 # In standard errors. The identifier weighs the rows of its first windows at a poor p, the oracle all at the last one.
 CLOSE = 0.1
-
-
-class WithoutWalks(NoiseFilters):
-    """The identifier has no noise of running integrals."""
-
-    def gains(self, record: Record) -> list[dict[str, list[Gain]]]:
-        found = super().gains(record)
-        return [{name: [one for one in own if one.order >= 0] for name, own in row.items()} for row in found]
 
 
 @pytest.mark.parametrize(
@@ -48,7 +38,7 @@ def test_the_identifier_s_p_is_that_of_the_oracle(name: str, soft: bool, monkeyp
     used = core.counters["rows"] // (design.functions * design.model.kinds)
     assert used >= len(rig.rows.numbers) - 2  # the last window's work takes half a window
     own = rig.rows.only(slice(0, used))
-    own.noise = NoiseModel(WithoutWalks(own.compiled.channels), own.record)
+    own.noise = noise_in_c(own)
     fit = batch(own, rig.config.estimator.start.astype(np.float64), equation_error=False)
     se = uncertainty(fit).predicted
     close = CLOSE * se
