@@ -80,7 +80,7 @@ def run(session: pytest.Session, workers: int) -> None:
     gc.collect()
     gc.freeze()
     forks: dict[Connection, _Fork] = {}
-    left = {item.nodeid: item for item in session.items}
+    left = dict.fromkeys(item.nodeid for item in session.items)
     for _ in range(min(workers, len(files))):
         here, there = Pipe(duplex=False)
         pid = os.fork()
@@ -115,7 +115,7 @@ def run(session: pytest.Session, workers: int) -> None:
         _fail(config, nodeid, "not run: its process ended before")
 
 
-def _receive(ready: Connection, forks: dict[Connection, _Fork], config: pytest.Config, left: dict[str, Any]) -> None:
+def _receive(ready: Connection, forks: dict[Connection, _Fork], config: pytest.Config, left: dict[str, None]) -> None:
     fork, hook = forks[ready], config.hook
     try:
         what, data = ready.recv()

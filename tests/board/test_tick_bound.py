@@ -74,7 +74,7 @@ def test_a_loop_that_is_entered_in_its_middle_is_counted() -> None:
             50: (1, set(), True),
         }
     )
-    assert _longest(blocks, {10: 4}, {}) == 1 + 30 + 5 + 4 * (1 + 5) + 1 - 0 * 1
+    assert _longest(blocks, {10: 4}, {}) == 1 + 30 + 5 + 4 * (1 + 5) + 1
 
 
 def test_machine_code_is_read_with_switches_calls_and_conditions() -> None:

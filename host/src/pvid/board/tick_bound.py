@@ -105,13 +105,17 @@ def tick_bound(
     begin = next((at for at, name in names.items() if name == entry), None)
     if begin is None:
         raise PvidError(f"the image has no function {entry}")
+
+    def called(place: int, what: int | None) -> set[int]:
+        return {what} if what is not None else entered[place] or pointed
+
     reached, ahead = set[int](), [begin]
     while ahead:
         at = ahead.pop()
         if at in functions and at not in reached:
             reached.add(at)
             calls = [one for block in functions[at][1].values() for one in block.calls]
-            ahead += [to for place, what in calls for to in ({what} if what is not None else entered[place] or pointed)]
+            ahead += [to for one in calls for to in called(*one)]
     most = dict(run.most)
     for at in reached:
         words = max(_words(disassembly, names[at], {names[one] for one in reached}), default=0)
@@ -141,9 +145,6 @@ def tick_bound(
         if not cut:
             bounds[at] = longest
         return longest
-
-    def called(place: int, what: int | None) -> set[int]:
-        return {what} if what is not None else entered[place] or pointed
 
     bound = bound_of(begin)
     heads = {head for at in bounds for head in loops[at]}

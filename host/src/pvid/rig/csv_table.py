@@ -143,18 +143,17 @@ class _TextTable:
         }
         rows = (layout.cells(line) for line in lines[layout.body - 1 :])
         body = list(islice((cells for cells in rows if cells and self._is_row(cells)), _SAMPLED_ROWS))
-        times = sum(is_time(cells[self._places["t"]]) for cells in body)
-        self._time_is_text = 2 * times > len(body)
+        times = [cells[self._places["t"]] for cells in body]
+        self._time_is_text = 2 * sum(map(is_time, times)) > len(body)
         if self._time_is_text:
             units.pop("t")
         is_time_unit = unit_in(columns["t"].name, "s") or scale_to("s", units.get("t", "") or "1")
         if step is not None and not (notes or columns["t"].unit_given or self._time_is_text or is_time_unit):
             clock = TIME.is_called(columns["t"].name) and not layout.beside[0]
-            times_of_body = [cells[self._places["t"]] for cells in body]
-            if not clock and len(body) > 1 and counts_up(times_of_body):
+            if not clock and len(body) > 1 and counts_up(times):
                 columns, notes = step.of(columns), (f"{columns['t'].name} counts rows: one each {step}",)
                 units.pop("t")
-            elif (unit := step.unit_of(times_of_body)) is not None:
+            elif (unit := step.unit_of(times)) is not None:
                 name = columns["t"].name
                 if clock:
                     notes = (f"{name} is taken in s; in {unit}, --columns t={name}:{unit}, a row would be each {step}",)

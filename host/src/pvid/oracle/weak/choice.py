@@ -270,13 +270,11 @@ def _ranked(
         longest = max(parts, default=0)
         many = f"the run of {longest} samples ({longest / sample_rate:.3g} s)"
         needed = math.ceil(_SHORTEST_STEPS * (at_least[-1] + 1) / 2)
-        still, least = (
-            (", or moves in too little of that", "")
-            if longest >= needed
-            else ("", f", at least {needed} ({needed / sample_rate:.3g} s)")
-        )
         gap = "" if len(parts) < 2 else " without a gap"
-        raise PvidError(f"{many} is too short for {model.model.name}{still}: record more samples{gap}{least}")
+        short = f"{many} is too short for {model.model.name}"
+        if longest >= needed:
+            raise PvidError(f"{short}, or moves in too little of that: record more samples{gap}")
+        raise PvidError(f"{short}: record more samples{gap}, at least {needed} ({needed / sample_rate:.3g} s)")
     best = min(tried, key=_order)
     if best.chi2 > MODEL_ERROR and equation_error:
         errors, of_sensors = True, tried[:]
