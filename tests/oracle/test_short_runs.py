@@ -50,8 +50,7 @@ def test_run_that_moves_at_its_begin_alone_is_refused() -> None:
 
 
 def test_run_of_50_samples_is_refused() -> None:
-    with pytest.raises(
-        PvidError, match=r"the run of 50 samples \(0.5 s\) is too short for .*, at least 220 \(2.2 s\)$"
-    ):
+    expected = r"the run of 50 samples \(0.5 s\) is too short for .*: record more samples, at least 220 \(2.2 s\)$"
+    with pytest.raises(PvidError, match=expected):
         chosen(ready(MODEL), {"q": SWING.run(0)["q"][:50]}, RATE)
     assert np.isfinite(chosen(ready(MODEL), {"q": SWING.run(0)["q"][:220]}, RATE).window_s)
