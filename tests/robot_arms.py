@@ -110,16 +110,24 @@ def torques(chain: Chain, q: Float, v: Float, a: Float) -> Float:
     return out
 
 
-def motion(joints: int, seconds: float, rate: float, seed: int) -> tuple[Float, Float, Float, Float]:
-    """Times [s], positions, rates and accelerations [n, samples] of sines."""
+def motion(
+    joints: int, seconds: float, rate: float, seed: int, stops: float = 0.0
+) -> tuple[Float, Float, Float, Float]:
+    """Times [s], positions, rates and accelerations [n, samples] of sines; the second joint moves for `stops` s, then
+    rests as long."""
     random, t = np.random.default_rng(seed), np.arange(int(seconds * rate)) / rate
     q, v, a = np.zeros((3, joints, len(t)))
     for k in range(joints):
+        time, pace, change = t, np.ones(len(t)), np.zeros(len(t))
+        if stops and k == 1:
+            turn = 2 * math.pi * np.minimum(t % (2 * stops), stops) / stops
+            pace, change = 1 - np.cos(turn), 2 * math.pi / stops * np.sin(turn)
+            time = stops * (t // (2 * stops) + (turn - np.sin(turn)) / (2 * math.pi))
         for harmonic in range(1, 6):
             w, size, phase = 0.7 * harmonic, random.normal() * 0.5 / harmonic**0.5, random.uniform(0, 2 * math.pi)
-            q[k] += size * np.sin(w * t + phase)
-            v[k] += size * w * np.cos(w * t + phase)
-            a[k] -= size * w * w * np.sin(w * t + phase)
+            q[k] += size * np.sin(w * time + phase)
+            v[k] += size * w * np.cos(w * time + phase) * pace
+            a[k] += size * w * (np.cos(w * time + phase) * change - w * np.sin(w * time + phase) * pace**2)
     return t, q, v, a
 
 
@@ -135,12 +143,17 @@ def log_of(
     viscous: float = 0.5,
     dry: float = 1.0,
     soft: float = 0.0,
+    stops: float = 0.0,
 ) -> dict[str, Float]:
     """A recording of an arm: encoders with so many bits a turn, white noise of `blur` of their steps, and torques with
-    relative noise; `soft`: the speed at which dry friction has tanh(1) of its size."""  # fmt: skip
-    t, q, v, a = motion(len(chain.joints), seconds, rate, seed)
+    relative noise; `soft`: the speed at which dry friction has tanh(1) of its size; `stops` as of `motion`: at each
+    rest, friction carries another part of the load."""  # fmt: skip
+    t, q, v, a = motion(len(chain.joints), seconds, rate, seed, *([stops] if stops else []))
     exact = torques(chain, q, v, a)
     exact += viscous * v + dry * (np.tanh(v / soft) if soft else np.sign(v))
+    if stops:
+        carried = np.random.default_rng(seed + 2000).uniform(-dry, dry, int(seconds / stops) + 1)
+        exact[1, v[1] == 0] += carried[(t // (2 * stops)).astype(int)][v[1] == 0]
     random, step = np.random.default_rng(seed + 1000), 2 * math.pi / 2**bits
     positions = np.round((q + blur * step * random.normal(size=q.shape)) / step) * step
     measured = exact + noise * exact.std(axis=1, keepdims=True) * random.normal(size=exact.shape)

@@ -30,6 +30,7 @@ def test_a_robot_on_a_board_has_the_bits_of_the_host(
     design = replace(design, start_sd=1e3 * design.start_sd, noise_sd=0.1 * design.noise_sd)
     samples = samples[: {"spatial": 5, "panda": 3}[arm] * int(ARMS[arm])].copy()
     samples[600, 0] = np.nan
+    samples[200:500, 0] = samples[200, 0]  # a rest
     reason, hashes = RobotNative(model, design).run(samples)
     assert Reason.UPDATED in reason
     report = play(target, build_robot_image(target, RobotFiles(model, "a test", design), samples)[0], 120.0)

@@ -11,6 +11,7 @@
 #define HALF (TAPS / 2u)
 #define RATE 200.0f
 #define ROOM 512u
+#define PI 3.14159265358979
 
 static const uint16_t end[1] = {P};
 static const uint8_t column[P] = {0, 1, 2, 3};
@@ -47,6 +48,7 @@ static float torque[8u * L * MOST_D];
 static float added[2u * PVID_ROBOT_NOISE];
 static float noise_sd[1];
 static float blur; /* of the encoder [rad] */
+static bool rests; /* half of the time */
 static unsigned decimation = MOST_D;
 static const float start[P] = {0.1f, 1.0f, 0.0f, 0.0f};
 static const float start_sd[P] = {10.0f, 10.0f, 10.0f, 10.0f};
@@ -127,12 +129,24 @@ static void begin(void)
 /* The joint and the current of its motor at a tick, with a parameter w. */
 static void sample_at(unsigned tick, double w, float sample[2])
 {
-    const double t = tick / (double)RATE;
-    const double q = sin(1.3 * t) + 0.6 * sin(2.9 * t + 1.0) + 0.3 * cos(4.1 * t);
-    const double v = 1.3 * cos(1.3 * t) + 1.74 * cos(2.9 * t + 1.0) - 1.23 * sin(4.1 * t);
-    const double a = -1.69 * sin(1.3 * t) - 5.046 * sin(2.9 * t + 1.0) - 5.043 * cos(4.1 * t);
     const double noise = ((tick * 2654435761u) % 1000u) / 1000.0 - 0.5;
-    const double tau = truth[0] * a + w * sin(q) + truth[2] * v + truth[3] * ((v > 0.0) ? 1.0 : -1.0) + 0.1 * noise;
+    double t = tick / (double)RATE;
+    double speed = 1.0; /* dt of the motion */
+    double more = 0.0;
+    if (rests) { /* 2 s of motion, 2 s of rest, where friction carries a part of the load */
+        const double x = t - (4.0 * floor(t / 4.0));
+        const bool still = x > 2.0;
+        speed = still ? 0.0 : (1.0 - cos(PI * x));
+        more = still ? 0.0 : (PI * sin(PI * x));
+        t = (2.0 * floor(t / 4.0)) + (still ? 2.0 : (x - (sin(PI * x) / PI)));
+    }
+    const double q = sin(1.3 * t) + 0.6 * sin(2.9 * t + 1.0) + 0.3 * cos(4.1 * t);
+    const double pace = 1.3 * cos(1.3 * t) + 1.74 * cos(2.9 * t + 1.0) - 1.23 * sin(4.1 * t);
+    const double v = pace * speed;
+    const double a =
+        ((-1.69 * sin(1.3 * t) - 5.046 * sin(2.9 * t + 1.0) - 5.043 * cos(4.1 * t)) * speed * speed) + (pace * more);
+    const double dry = (speed == 0.0) ? (-0.6 * sin(q)) : ((v > 0.0) ? 1.0 : -1.0);
+    const double tau = truth[0] * a + w * sin(q) + truth[2] * v + truth[3] * dry + 0.1 * noise;
     sample[0] = (float)(q + (double)blur * random_at(tick + 777777u));
     sample[1] = (float)(tau / 2.0);
 }
@@ -194,16 +208,19 @@ static void more_noise_than_motion_is_not_published(void **state)
     static const float loud[2] = {0.003f, 0.02f}; /* the noise of the rate is 0.3 and twice the rate */
     for (unsigned k = 0; k < 2u; k++) {
         blur = loud[k];
-        begin();
+        pvid_robot_config_f32 config = config_of();
+        config.memory = 300;
+        assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
         float sample[2];
         unsigned uncertain = 0;
         unsigned number = 0;
-        for (unsigned tick = 0; tick < 24000u; tick++) {
+        for (unsigned tick = 0; tick < 48000u; tick++) {
             sample_at(tick, 2.0, sample);
             const pvid_reason reason = pvid_robot_step_f32(&robot, sample);
             number += (reason == PVID_UPDATED) ? 1u : 0u;
             uncertain += ((reason == PVID_HELD_UNCERTAIN) || (reason == PVID_HELD_SINGULAR)) ? 1u : 0u;
         }
+        assert_true(robot.rows[0] <= (config.memory + 20u)); /* rows grow old whether or not estimates are held */
         assert_true((k == 0u) ? ((number > 20u) && (uncertain < number)) : ((number == 0u) && (uncertain > 20u)));
     }
     blur = 0.0f;
@@ -274,12 +291,12 @@ static void without_motion_nothing_is_published(void **state)
         const pvid_reason reason = pvid_robot_step_f32(&robot, still);
         assert_int_not_equal(reason, PVID_REJECTED_SATURATED);
         assert_int_not_equal(reason, PVID_UPDATED);
-        held_ticks += (reason == PVID_HELD_UNCERTAIN) ? 1u : 0u;
+        held_ticks += (reason == PVID_HELD_NOT_EXCITED) ? 1u : 0u;
     }
     assert_true(pvid_robot_read_f32(&robot, estimate, &number));
     assert_int_equal(number, 0);
-    assert_true(held_ticks > 5u);
-    assert_int_equal(robot.held, held_ticks);
+    assert_true(held_ticks > 150u);
+    assert_int_equal(robot.held + robot.rows[0], 0);
     for (unsigned k = 0; k < P; k++) {
         assert_float_equal(estimate[k], start[k], 0.0f);
         assert_float_equal(estimate[P + k], start_sd[k], 1.0e-4f);
@@ -289,28 +306,34 @@ static void without_motion_nothing_is_published(void **state)
     require_truth(2.0);
 }
 
-/* At rest the noise that is added again is all that the columns contain: nothing is solved, and rows grow old all the
- * same. */
 static void a_joint_that_has_rested_is_found_when_it_moves(void **state)
 {
-    pvid_robot_config_f32 config = config_of();
-    config.memory = 1000;
     blur = 3.0e-4f;
-    noise_sd[0] = blur;
-    assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
+    begin();
+    float sample[2] = {0.0f, 0.01f};
     for (unsigned tick = 0; tick < 120000u; tick++) {
-        const float still[2] = {0.0f, 0.01f};
-        assert_int_not_equal(pvid_robot_step_f32(&robot, still), PVID_UPDATED);
-        assert_true(robot.rows[0] <= (config.memory + 20u));
+        sample[0] = blur * (float)random_at(tick);
+        assert_int_not_equal(pvid_robot_step_f32(&robot, sample), PVID_UPDATED);
     }
-    pvid_robot_gap_f32(&robot); /* a jump to the first sample is no motion */
+    assert_true(robot.rows[0] < 80u); /* of 8000 */
     assert_true(play(0, 20000, 2.0) > 20u);
     blur = 0.0f;
-    float estimate[2u * P];
-    assert_true(pvid_robot_read_f32(&robot, estimate, NULL));
-    for (unsigned k = 0; k < 2u; k++) {
-        assert_true(fabs((double)estimate[k] - truth[k]) < 4.0 * (double)estimate[P + k]);
-    }
+    require_truth(2.0);
+}
+
+/* At rest friction is any torque: with the rows of it J was 13 standard errors off. */
+static void a_joint_that_rests_half_of_the_time_has_its_parameters(void **state)
+{
+    blur = 3.0e-4f;
+    rests = true;
+    pvid_robot_config_f32 config = config_of();
+    config.memory = 10000;
+    assert_int_equal(pvid_robot_init_f32(&robot, &config, memory, ROOM), PVID_OK);
+    assert_true(play(0, 80000, 2.0) > 80u);
+    rests = false;
+    blur = 0.0f;
+    assert_true((robot.rows[0] > 2000u) && (robot.rows[0] < 2667u)); /* of 5333 */
+    require_truth(2.0);
 }
 
 static void one_sample_out_of_range_costs_its_splines_alone(void **state)
@@ -327,7 +350,8 @@ static void one_sample_out_of_range_costs_its_splines_alone(void **state)
         }
         bool saturated = false;
         for (unsigned tick = 0; tick < samples; tick++) {
-            saturated = (pvid_robot_step_f32(&robot, bad[k]) == PVID_REJECTED_SATURATED) || saturated;
+            const float sample[2] = {bad[k][0] + (0.001f * (float)(tick % 7u)), bad[k][1]}; /* it does not rest */
+            saturated = (pvid_robot_step_f32(&robot, sample) == PVID_REJECTED_SATURATED) || saturated;
         }
         assert_true(saturated == (k < 3u));
         (void)play(1000u + samples, 6000, 2.0);
@@ -345,7 +369,7 @@ static void without_accepted_rows_nothing_is_published(void **state)
     const uint32_t number = robot.number;
     const uint32_t rows = robot.rows[0];
     for (unsigned tick = 0; tick < 6000u; tick++) {
-        const float huge[2] = {0.0f, 9.0e8f};
+        const float huge[2] = {0.001f * (float)(tick % 7u), 9.0e8f};
         assert_int_not_equal(pvid_robot_step_f32(&robot, huge), PVID_UPDATED);
     }
     assert_true((robot.number == number) && (robot.rows[0] == rows) && (robot.saturated > 10u));
@@ -603,6 +627,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test(a_changed_joint_is_followed_with_a_short_memory),
     cmocka_unit_test(what_is_not_finite_restarts_the_splines_and_keeps_the_sums),
     cmocka_unit_test(a_joint_that_has_rested_is_found_when_it_moves),
+    cmocka_unit_test(a_joint_that_rests_half_of_the_time_has_its_parameters),
     cmocka_unit_test(one_sample_out_of_range_costs_its_splines_alone),
     cmocka_unit_test(without_accepted_rows_nothing_is_published),
     cmocka_unit_test(a_turn_too_many_is_an_outlier),

@@ -33,8 +33,10 @@
  * sample behind it is in no later row. Four outliers of a joint within 64 of its rows open the gate until as many rows
  * are accepted: a changed plant is followed. Not caught: a bad sample before the first estimate, while a joint has less
  * than 2 p / n + 1 rows or its gate is open, one that moves every row by less than 16 s_i, and the rows of the joints
- * before the one that shows it. A joint that rests for much of the time has a wrong friction. What is not caught stays
- * until `memory` rows have passed several times, or init.
+ * before the one that shows it. What is not caught stays until `memory` rows have passed several times, or init.
+ *
+ * At rest, friction is any torque up to the dry one. Rows of a joint are not used that contain an interval in which its
+ * position stays within 6 standard deviations of its noise: they return PVID_HELD_NOT_EXCITED.
  *
  * Never allocates: all that depends on the model is in `memory`, and no PVID_MAX_ size matters. Every input is allowed.
  * Call all functions from one context, except pvid_robot_read_f32.
@@ -132,6 +134,10 @@ typedef struct {
     uint32_t rows[PVID_ROBOT_JOINTS];  /* accepted, in S_i */
     float part;                        /* of s_i^2 that is noise of the encoders, the largest of all joints */
     bool rounded[PVID_ROBOT_JOINTS];   /* Q_i is the rounding of a far larger one: the joint begins again */
+    float spread;                      /* of positions of a joint at rest, in noise_sd */
+    float from[PVID_ROBOT_JOINTS];     /* position that a joint has been near for .. */
+    uint16_t still[PVID_ROBOT_JOINTS]; /* .. so many steps, at most an interval */
+    uint8_t rest[PVID_ROBOT_JOINTS];   /* next rows that contain a rest: they are not used */
     uint32_t doubt[PVID_ROBOT_JOINTS]; /* 16 for each outlier, less 1 for each accepted row */
     uint32_t rejected;                 /* samples that were not finite, or beyond their range */
     uint32_t saturated;                /* rows beyond 1e9 */
@@ -174,6 +180,7 @@ pvid_status pvid_robot_init_f32(pvid_robot_f32 *self, const pvid_robot_config_f3
  *   - PVID_WARMING_UP until the first row, and while the polynomials fill after a restart,
  *   - PVID_REJECTED_NOT_FINITE for a sample that is not, PVID_REJECTED_SATURATED for |q| > 16384 or a torque beyond
  * 1e9, or a row beyond 1e9, PVID_REJECTED_OUTLIER for a row: each restarts the splines,
+ *   - PVID_HELD_NOT_EXCITED where the row of a joint contains a rest of it and is not used,
  *   - PVID_UPDATED at the tick of a new estimate,
  *   - PVID_HELD_UNCERTAIN in its place while a standard error is not below half its start_sd, or the noise of the
  * encoders is more than half of S in the direction of a parameter: motion or time is missing,

@@ -24,6 +24,8 @@
 #define FALL 9.765625e-4f     /* of Q_i, beyond which it is rounding */
 #define QUADRATIC 4.0f        /* of D, where all of s_i^2 is noise of the encoders */
 #define KNOWN 0.5f            /* standard error of a known parameter, of that of the start */
+#define STILL 6.0f            /* times the noise of a position: a joint that has not moved */
+#define RESTED (SPLINES + 1u) /* rows that contain a rest, and one that begins while a row is added */
 #define MOST_TAPS 1024u
 #define MOST_ROWS 1048576u
 #define MOST_TICKS 65535u /* of an interval */
@@ -206,6 +208,11 @@ static pvid_status prepare(pvid_robot_f32 *self, const pvid_robot_config_f32 *co
     }
     self->config = *config;
     self->memory = memory;
+    float square = 0.0f;
+    for (uint32_t i = 0; i < PVID_ROBOT_NOISE; i++) {
+        square += design->noise[i] * design->noise[i];
+    }
+    self->spread = STILL * sqrtf(square / (float)PVID_ROBOT_NOISE);
     memset(memory, 0, self->at.end * sizeof memory[0]);
     for (uint32_t k = 0; k < model->p; k++) {
         memory[self->at.p + k] = config->start[k];
@@ -288,6 +295,20 @@ static void set_input(const pvid_robot_f32 *self, float in[], uint32_t joint, fl
     in[(2u * n) + joint] = (pvid_magnitude_f32(v) >= jump) ? pvid_sign_f32(v) : (v / jump);
 }
 
+/* Rows that contain a rest of an interval are not to be used: at rest, friction is any torque up to the dry one. */
+static void watch(pvid_robot_f32 *self, uint32_t joint, float q)
+{
+    const pvid_robot_design_f32 *design = self->config.design;
+    if (pvid_magnitude_f32(q - self->from[joint]) > (self->spread * design->noise_sd[joint])) {
+        self->from[joint] = q;
+        self->still[joint] = 0;
+    } else if (self->still[joint] < design->interval) {
+        self->still[joint]++;
+    } else {
+        self->rest[joint] = (uint8_t)RESTED;
+    }
+}
+
 /* The inputs of a step, without and with added noise, and from the first ones the values. */
 static void take_step(pvid_robot_f32 *self)
 {
@@ -309,6 +330,7 @@ static void take_step(pvid_robot_f32 *self)
             v += design->rate[i - 1u] * (later - earlier);
         }
         q += centre;
+        watch(self, j, q);
         set_input(self, in, j, q, v);
         q += design->noise_sd[j] * design->noise[place];
         v += design->noise_sd[j] * design->noise[PVID_ROBOT_NOISE + place];
@@ -419,10 +441,28 @@ static void add_square(float to[], const float x[], uint32_t n)
     }
 }
 
+/* The white row of a joint at rest: the next one is white of itself. */
+static pvid_reason leave_row(pvid_robot_f32 *self, uint8_t joint)
+{
+    const pvid_robot_model_f32 *model = self->config.model;
+    float *u = &self->memory[self->at.white + (self->latest * width_of(self))];
+    for (uint32_t i = first_of(model, joint); i < model->end[joint]; i++) {
+        u[i] = 0.0f;
+        u[(uint32_t)self->slots + model->joints + i] = 0.0f;
+    }
+    u[(uint32_t)self->slots + joint] = 0.0f;
+    self->rest[joint]--;
+    self->row = (uint8_t)(self->row + 2u);
+    return PVID_HELD_NOT_EXCITED;
+}
+
 static pvid_reason add_row(pvid_robot_f32 *self)
 {
     const pvid_robot_model_f32 *model = self->config.model;
     const uint8_t joint = (uint8_t)(self->row / 2u);
+    if (self->rest[joint] > 0u) {
+        return leave_row(self, joint);
+    }
     const uint16_t first = first_of(model, joint);
     const uint32_t n = (uint32_t)model->end[joint] - first;
     const float *u = &self->memory[self->at.white + (self->latest * width_of(self)) + first];

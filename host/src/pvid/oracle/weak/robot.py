@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -171,15 +171,17 @@ class RobotRun:
         whole = max(parts, key=lambda one: one.shape[1])
         inner = slice(_LONGEST, -_LONGEST)
         short = polynomial_weights(_SHORTEST, POLYNOMIAL, 0)
-        left = whole - self.smoothed(whole, _SHORTEST, 0)
-        sd = np.sqrt(np.mean(left[:, inner] ** 2, axis=1) / (1 - short[_SHORTEST // 2]))
+        left = (whole - self.smoothed(whole, _SHORTEST, 0))[:, inner]
         rates, taps = self.smoothed(whole, _SHORTEST, 1)[:, inner], _SHORTEST
+        motion = np.abs(self.smoothed(whole, _LONGEST, 1)[:, inner])
+        moves = motion >= _SLOW * np.sqrt(np.mean(motion**2, axis=1, keepdims=True))  # at rest rounding hides the noise
+        sd = np.sqrt(_mean_square(left, moves) / (1 - short[_SHORTEST // 2]))
         for longer in range(_SHORTEST + 2, _LONGEST + 1, 2):
             apart = self.smoothed(whole, longer, 1)[:, inner] - rates
             weights = polynomial_weights(longer, POLYNOMIAL, 1).copy()
             inner_taps = slice((longer - _SHORTEST) // 2, (longer + _SHORTEST) // 2)
             weights[inner_taps] -= polynomial_weights(_SHORTEST, POLYNOMIAL, 1)
-            if np.any(np.mean(apart**2, axis=1) > _BLURRED * (sd * rate) ** 2 * np.sum(weights**2)):
+            if np.any(_mean_square(apart, moves) > _BLURRED * (sd * rate) ** 2 * np.sum(weights**2)):
                 break
             taps = longer
         smooth = self.smoothed(whole, taps, 1)[:, inner]
@@ -218,6 +220,11 @@ class RobotRun:
                 continue
             position, rate = (self.smoothed(q, taps, order)[:, steps] for order in (0, 1))
             yield Segment(self.chain, columns, position, rate, torque[:, steps], size)
+
+
+def _mean_square(x: Float, where: npt.NDArray[np.bool_]) -> Float:
+    """Of each row [n]."""
+    return np.asarray(np.sum(x**2 * where, axis=1) / np.sum(where, axis=1))
 
 
 @dataclass(frozen=True)
@@ -497,7 +504,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     drawn = np.zeros((_DRAWS, rows.windows, len(columns)))
     for seed in range(_DRAWS):
         for sign in (1, -1):
-            noisy = RobotRows.of(whole, columns, seed, sign).white(roots)
+            noisy = replace(RobotRows.of(whole, columns, seed, sign), doubts=rows.doubts).white(roots)
             again = noisy.moments()
             more_s += (again[0] - s) / (2 * _DRAWS)
             more_f += (again[1] - f) / (2 * _DRAWS)
