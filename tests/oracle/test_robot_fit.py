@@ -201,6 +201,23 @@ def test_noise_of_the_encoders_biases_and_the_bias_is_taken_off() -> None:
     assert np.mean(np.abs(off_by(found, "p")) < 2) > 0.90
 
 
+def test_what_leans_on_a_direction_that_noise_hides_has_no_value() -> None:
+    """12 bits with noise of three counts: hy2 of the last motion was 5.4 standard errors off."""
+    found = fits(6, bits=12, blur=3.0)
+    hidden = np.array([one.undetermined for one in found])
+    assert 0.3 < hidden.mean() < 0.7 and hidden[-1][list(found[-1].run.model.p_names).index("hy2")]
+    assert np.max(np.abs(off_by(found, "p")[~hidden])) < 3  # 1.8
+    assert not any(one.undetermined.any() for one in fits(3, bits=12, blur=0.3))
+
+
+def test_the_polynomials_take_nothing_of_a_fast_motion() -> None:
+    """They were as long as noise hides what they take: inertias were 6 standard errors off."""
+    found = fits(6, stops=0.5)
+    assert {one.design.taps for one in found} <= {29, 31, 33, 35} and {one.design.taps for one in fits(2)} == {61}
+    off = off_by(found, "p")
+    assert np.mean(np.abs(off) < 2) > 0.93 and np.sqrt(np.mean(off**2)) < 1.2  # 99 % and 0.95; they were 86 % and 1.5
+
+
 def test_torques_of_unseen_motion_are_predicted_to_their_noise() -> None:
     fit = fits(1)[0]
     other = RobotRun(fit.run.model, robot_arms.log_of(SPATIAL, 77), RATE)

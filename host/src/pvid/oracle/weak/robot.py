@@ -30,7 +30,7 @@ from pvid.model.operations import evaluated
 from pvid.oracle.weak.filters import polynomial_weights
 from pvid.oracle.weak.front import filtered, of_hold, samples_of, segments_of
 from pvid.oracle.weak.functions import Float, TestFunctions
-from pvid.oracle.weak.solve import inverse, solved
+from pvid.oracle.weak.solve import RIDGE, inverse, solved
 
 POLYNOMIAL, _SHORTEST, _LONGEST = 4, 7, 61  # degree and taps of what gives positions and rates
 _BLURRED = 1.2  # of the noise of a rate: what a longer polynomial may change
@@ -47,6 +47,10 @@ _SLOW = 0.1  # of the root mean square of a rate: below it dry friction is in do
 _FAST = 0.4  # likewise: below it a joint is slow
 _CLEAR_RATE = 3.0  # of the noise of a rate, likewise
 _REACHED = 1e-6  # of the energy of a direction: what slow steps have of it
+_BENT = 1e-3  # of an acceleration: what a longer polynomial may take
+_BINS = 16  # of a spectrum, of whose mean chance makes _CLEAR times the noise in none
+_MOST_NOISE = 0.6  # of S in a direction: beyond it the correction of S is no better than its own noise
+_LEANS = 0.04  # of a variance, in such directions: five times their standard error is one of the whole
 _RIDGE = 1e-9  # of the variances, as rows depend on each other
 _MOST_BYTES = 4e9  # of the rows, with what is computed from them
 _HIDDEN = 0.9  # of the energy of a spring's torque
@@ -176,12 +180,17 @@ class RobotRun:
         motion = np.abs(self.smoothed(whole, _LONGEST, 1)[:, inner])
         moves = motion >= _SLOW * np.sqrt(np.mean(motion**2, axis=1, keepdims=True))  # at rest rounding hides the noise
         sd = np.sqrt(_mean_square(left, moves) / (1 - short[_SHORTEST // 2]))
+        w, bends = _bending(whole, sd)
+        sines = np.sin(np.outer(w, np.arange(1, _LONGEST // 2 + 1)))
         for longer in range(_SHORTEST + 2, _LONGEST + 1, 2):
             apart = self.smoothed(whole, longer, 1)[:, inner] - rates
             weights = polynomial_weights(longer, POLYNOMIAL, 1).copy()
             inner_taps = slice((longer - _SHORTEST) // 2, (longer + _SHORTEST) // 2)
             weights[inner_taps] -= polynomial_weights(_SHORTEST, POLYNOMIAL, 1)
             if np.any(_mean_square(apart, moves) > _BLURRED * (sd * rate) ** 2 * np.sum(weights**2)):
+                break
+            rates_off = 2 * sines[:, : longer // 2] @ polynomial_weights(longer, POLYNOMIAL, 1)[longer // 2 + 1 :] - w
+            if np.any(bends @ rates_off**2 > _BENT**2):
                 break
             taps = longer
         smooth = self.smoothed(whole, taps, 1)[:, inner]
@@ -220,6 +229,30 @@ class RobotRun:
                 continue
             position, rate = (self.smoothed(q, taps, order)[:, steps] for order in (0, 1))
             yield Segment(self.chain, columns, position, rate, torque[:, steps], size)
+
+
+def _bending(q: Float, sd: Float) -> tuple[Float, Float]:
+    """Frequencies at which some joint moves clear of its noise [rad a sample], and what of the square of each joint's
+    acceleration is there, over the square of the frequency [n, frequencies]: the square of the part that an error of
+    rates takes of it, by its product with the square of the error."""
+    n = q.shape[1]
+    window = np.hanning(n)
+    power = np.abs(np.fft.rfft((q - q.mean(axis=1, keepdims=True)) * window)) ** 2
+    mean = np.array([np.convolve(one, np.ones(_BINS) / _BINS, "same") for one in power])
+    power *= mean > _CLEAR * sd[:, np.newaxis] ** 2 * np.sum(window**2)
+    w, clear = 2 * math.pi * np.fft.rfftfreq(n), np.any(power, axis=0)
+    w, power = w[clear], power[:, clear]
+    return w, np.asarray(power * w**2 / np.maximum(power @ w**4, 1e-300)[:, np.newaxis])
+
+
+def _hidden(s: Float, noise: Float) -> Float:
+    """Part of the variance of each parameter that is of directions in which noise of the encoders is most of S [p]."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
+    sizes, axes = np.linalg.eigh(s * np.outer(scale, scale))
+    root = scale[:, np.newaxis] * axes / np.sqrt(np.maximum(sizes, RIDGE))
+    parts, directions = np.linalg.eigh(root.T @ noise @ root)
+    variances = (root @ directions) ** 2 / np.maximum(np.abs(1 - parts), RIDGE)
+    return np.asarray(np.sum(variances[:, parts > _MOST_NOISE], axis=1) / np.sum(variances, axis=1))
 
 
 def _mean_square(x: Float, where: npt.NDArray[np.bool_]) -> Float:
@@ -411,8 +444,8 @@ class RobotFit:
     uncorrected : p with the noise of the encoders in the regressors [p]
     halves : of the first and of the second half of the windows [2, p]
     apart : their difference over its standard error [p]
-    undetermined : a standard error is worth more than a tenth of the torques, or its direction has more noise than
-        motion [p]
+    undetermined : a standard error is worth more than a tenth of the torques, or leans on directions that have more
+        noise than motion [p]
     windows : of the run
     lacking : terms that the equations may lack, one, two, .. together: each time the surest is added, as the last one
     springs : what a spring of 1 N m/rad or N/m at each joint moves p by [n, p]; 0 where p takes too little of it to
@@ -535,7 +568,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     size = np.sqrt(np.diag(covariance) * np.diag(s))
     balanced = np.sum(white.regressors[idle] ** 2, axis=(0, 1, 3)) * p**2  # what cancels where no torque is
     undetermined = ~(size < _COVERED * np.sqrt(np.sum(white.known**2) + np.sum(balanced)))
-    undetermined |= np.diag(bread @ more_s @ bread) > np.diag(bread)  # more noise than motion
+    undetermined |= _hidden(s, more_s) > _LEANS
     middle = rows.windows // 2
     halves, variances = [], []
     for part in (slice(0, middle), slice(middle, None)):
