@@ -2,9 +2,11 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from program import pvid
 
 from pvid.cli.main import commands
 from pvid.models.registry import names
@@ -39,3 +41,8 @@ def test_what_is_nearly_a_command_is_proposed() -> None:
     assert near.exit_code == 2 and "there is no command 'identifx': did you mean identify?" in near.stderr
     far = CliRunner().invoke(commands, ["qqq"])
     assert far.exit_code == 2 and "there is no command 'qqq'" in far.stderr and "mean" not in far.stderr
+
+
+def test_what_a_missing_option_can_be_stands_in_its_sentence(tmp_path: Path) -> None:
+    missing = pvid(tmp_path, "deploy", "dc_motor", "-o", "x")
+    assert "Missing option '--for'. Choose from: arduino, platformio, esp-idf" in missing.stderr

@@ -145,6 +145,10 @@ def test_rotors_offsets_currents_and_held_torques_are_known() -> None:
     truth = {one.name: value for one, value in zip(model.unknowns, truth_of(chain), strict=True)}
     truth["Offset2"] = 0.4
 
+    header = RobotFiles(model, "").files()["arm_robot.h"]
+    assert re.search(r'sample\[5\] +i3 +\[A\] +hold="zoh": from this sample to the next\n', header)
+    assert "zoh" not in RobotFiles(model_of(chain, name="arm"), "").files()["arm_robot.h"]
+
     def off(hold: Any) -> Any:
         signals = tuple(replace(one, hold=hold) if one.kind == "input" else one for one in model.signals)
         own = replace(model, signals=signals)

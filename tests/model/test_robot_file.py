@@ -87,6 +87,7 @@ def test_the_model_file_is_short(tmp_path: Path) -> None:
     text = model_text(tmp_path / "arm.urdf")
     assert "rpy=(-pi/2, 0, 0)," in text and 'model.joint("shoulder",' in text
     assert "limits=(-2, 2), speed=3, torque=50," in text and "friction=(0.2, 0.5), speed=4, torque=20," in text
+    assert text.startswith('"arm.urdf: 2 joints, by `pvid model from`. Torques that are commanded and held')
     assert len(text.splitlines()) < 12 and max(map(len, text.splitlines())) <= 200
 
 

@@ -21,7 +21,8 @@
  * Errors are of A^-1 (A + (1 + 4 r) D) A^-1, D = sum_i D_i / s_i^2: of S e, and of d (d p), whose variance for Gaussian
  * d of covariance C is C (p^T C p) + C p p^T C, at most 2 C p^T C p; both the noise and what is added again have it,
  * and r is the part p^T D_i p / rows_i of s_i^2, the largest of all joints, at most 1. Where x^T D x > x^T A x in the
- * direction x = A^-1 e_k of a parameter, half of S is noise, and nothing is published.
+ * direction x = A^-1 e_k of a parameter, half of S is noise, and nothing is published. The error of a torque's gain is
+ * not in them: `pvid identify --core f32` has it.
  *
  *   static pvid_robot_f32 identifier;
  *   static float memory[ARM_MEMORY];

@@ -134,7 +134,8 @@ def _own_error(error: Exception) -> int:
 def _usage(error: click.ClickException) -> str:
     """The sentence of a wrong command line, and where its help is."""
     context = getattr(error, "ctx", None)
-    return error.format_message() + (f" (see {context.command_path} --help)" if context is not None else "")
+    text = " ".join(error.format_message().split())  # click lists choices by lines and tabs
+    return text + (f" (see {context.command_path} --help)" if context is not None else "")
 
 
 class Commands(click.Group):

@@ -157,7 +157,9 @@ class RobotFiles:
     def _header(self) -> str:
         n, upper = len(self.chain.joints), self.name.upper()
         signals = {one.name: one for one in self.compiled.signals}
-        rows = [(f"sample[{k}]", one, f"[{signals[one].unit}]") for k, one in enumerate(self.samples)]
+        held = {"zoh": 'hold="zoh": from this sample to the next'}
+        rows = [(f"sample[{k}]", one, f"[{signals[one].unit}]", held.get(signals[one].hold, ""))
+                for k, one in enumerate(self.samples)]  # fmt: skip
         parameters = [
             (f"p[{k}]", self.chain.name_of(one), f"[{unknown.unit}]", self.chain.closed_form(one))
             for k, (one, unknown) in enumerate(zip(self.chain.base, self.compiled.unknowns, strict=True))

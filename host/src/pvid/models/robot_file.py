@@ -131,7 +131,10 @@ def text_of(robot: Placed, path: Path, folder: Path | None = None) -> str:
     model, names = robot.model, robot.names
     source = os.path.relpath(path, folder or path.parent).replace(os.sep, "/")
     lines = [
-        json.dumps(f"{printable(path.name)}: {len(names) - robot.free} joints, by `pvid model from`."),
+        json.dumps(
+            f"{printable(path.name)}: {len(names) - robot.free} joints, by `pvid model from`. Torques that are "
+            "commanded and held, not measured, have hold='zoh'."
+        ),
         "",
         "from pvid.model import Robot, pi",
         "",

@@ -242,7 +242,7 @@ def _bending(q: Float, sd: Float) -> tuple[Float, Float]:
     power *= mean > _CLEAR * sd[:, np.newaxis] ** 2 * np.sum(window**2)
     w, clear = 2 * math.pi * np.fft.rfftfreq(n), np.any(power, axis=0)
     w, power = w[clear], power[:, clear]
-    return w, np.asarray(power * w**2 / np.maximum(power @ w**4, 1e-300)[:, np.newaxis])
+    return np.asarray(w), np.asarray(power * w**2 / np.maximum(power @ w**4, 1e-300)[:, np.newaxis])
 
 
 def _hidden(s: Float, noise: Float) -> Float:
