@@ -171,20 +171,43 @@ static void without_a_limit_of_misfit_there_is_none(void **state)
     is(PVID_STANDING_VALID, 0);
 }
 
+/* Windows of one kind's rows, from the oldest on. */
+static void take_rejected(const char *windows)
+{
+    for (; *windows != '\0'; windows++) {
+        judge.rejects = *windows == 'x';
+        take(good(), 1);
+    }
+}
+
 static void six_rejected_windows_of_sixteen_are_a_doubt(void **state)
 {
     take(good(), 20);
-    for (int i = 0; i < 5; i++) {
-        pvid_standing_skip(&judge, true, 0);
-    }
+    take_rejected("xx.xx.x");
     is(PVID_STANDING_VALID, 0);
-    judge.rejects = true; /* of one kind */
-    take(good(), 1);
+    take_rejected("x");
     is(PVID_STANDING_DOUBTED, PVID_DOUBT_REJECTS);
-    take(good(), 9);
+    take_rejected("........");
     is(PVID_STANDING_DOUBTED, PVID_DOUBT_REJECTS);
-    take(good(), 2);
+    take_rejected(".");
     is(PVID_STANDING_VALID, 0);
+}
+
+static void the_last_three_windows_rejected_are_a_doubt(void **state)
+{
+    take(good(), 20);
+    take_rejected("xx.xx");
+    is(PVID_STANDING_VALID, 0);
+    take_rejected("x");
+    is(PVID_STANDING_DOUBTED, PVID_DOUBT_REJECTS);
+    take_rejected(".");
+    is(PVID_STANDING_VALID, 0);
+    take(good(), 16);
+    pvid_standing_skip(&judge, true, 0);
+    pvid_standing_skip(&judge, true, 0);
+    is(PVID_STANDING_VALID, 0);
+    pvid_standing_skip(&judge, true, 0);
+    is(PVID_STANDING_DOUBTED, PVID_DOUBT_REJECTS);
 }
 
 static void an_estimate_ends_to_be_valid_by_its_age(void **state)
@@ -193,7 +216,7 @@ static void an_estimate_ends_to_be_valid_by_its_age(void **state)
     pvid_standing_window mute = held(ONE);
     take(good(), 20);
     for (int i = 0; i < 30; i++) {
-        pvid_standing_skip(&judge, (i % 8) == 7, 30);
+        pvid_standing_skip(&judge, (i % 15) == 14, 30);
     }
     is(PVID_STANDING_VALID, 0);
     pvid_standing_skip(&judge, false, 30);
@@ -298,6 +321,7 @@ static const struct CMUnitTest tests[] = {
     cmocka_unit_test_setup(windows_before_p_arrives_are_no_misfit, start_again),
     cmocka_unit_test_setup(without_a_limit_of_misfit_there_is_none, start_again),
     cmocka_unit_test_setup(six_rejected_windows_of_sixteen_are_a_doubt, start_again),
+    cmocka_unit_test_setup(the_last_three_windows_rejected_are_a_doubt, start_again),
     cmocka_unit_test_setup(an_estimate_ends_to_be_valid_by_its_age, start_again),
     cmocka_unit_test_setup(an_opening_withdraws_and_starts_at_the_trusted_p, start_again),
     cmocka_unit_test_setup(six_starts_in_turn_then_a_pause, start_again),

@@ -37,7 +37,7 @@ typedef enum {
     PVID_DOUBT_CONTRADICTED = 1, /* the present estimate is more than 5 joint standard errors away, twice in a row */
     PVID_DOUBT_GREW = 2,         /* its standard errors are more than 3 times those that were published */
     PVID_DOUBT_MISFIT = 4,       /* the residuals of most windows are larger than the sensors' noise explains */
-    PVID_DOUBT_REJECTS = 8,      /* the gate rejected rows in 6 of the last 16 windows */
+    PVID_DOUBT_REJECTS = 8,      /* the gate rejected rows of the last 3 windows, or of 6 of the last 16 */
     PVID_DOUBT_CHANGED = 16,     /* the gate has opened to a changed mechanism: p starts again */
     PVID_DOUBT_AGED = 32         /* no publication in the last `age_max` windows (trust.h) */
 } pvid_doubt;

@@ -9,6 +9,7 @@
 #define ONE_Q16 65536u
 #define FIT_MAX (ONE_Q16 + (ONE_Q16 / 2u)) /* largest mean of the ratios that is a fit without chance */
 #define REJECTED_MAX 6u                    /* of the last 16 windows */
+#define REJECTED_LAST 7u                   /* the last three: a wild sample is in two */
 #define CONFIRMED 8u                       /* valid publications in a row: p is trusted */
 #define PATIENCE 12u                       /* windows without a publication until p starts again */
 #define STARTS 6u                          /* in a row; then */
@@ -57,7 +58,9 @@ static uint32_t count_window(pvid_standing_judge *self, bool rejected)
     if ((self->starts >= STARTS) && (self->windows >= PAUSE)) {
         self->starts = 0;
     }
-    return (ones(self->history) >= REJECTED_MAX) ? (uint32_t)PVID_DOUBT_REJECTS : 0u;
+    const bool often = ones(self->history) >= REJECTED_MAX;
+    const bool lately = ((uint32_t)self->history & REJECTED_LAST) == REJECTED_LAST;
+    return (often || lately) ? (uint32_t)PVID_DOUBT_REJECTS : 0u;
 }
 
 /* The mean of n numbers, the last of them x. */
