@@ -8,7 +8,7 @@ from pvid.base.errors import PvidError
 from pvid.board.longest_tick import longest_tick
 from pvid.board.mechanism_image import mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
-from pvid.board.tick_bound import _Block, _functions, _longest_path, _loops
+from pvid.board.tick_bound import _Block, _functions, _longest_path, _loops, _words
 from pvid.settings.enums import Core
 
 
@@ -110,3 +110,18 @@ def test_machine_code_is_read_with_switches_calls_and_conditions() -> None:
     assert blocks[0x10E].calls == [(0x10E, None)] and blocks[0x10E].next == {0x110}
     assert blocks[0x110].ends and blocks[0x110].next == {0x114}
     assert blocks[0x114].ends and blocks[0x114].calls == [(0x114, 0x200)] and not blocks[0x114].next
+
+
+def test_what_memset_fills_is_that_of_the_functions_reached_not_of_others_of_their_name() -> None:
+    code = """
+00000100 <prepare>:
+     100:	2210      	movs	r2, #16
+     102:	f7ff ffff 	bl	300 <memset>
+
+00000200 <prepare>:
+     200:	f241 32d0 	movw	r2, #5072	@ 0x13d0
+     204:	f7ff ffff 	bl	300 <memset>
+"""
+    assert list(_words(code, "memset", {0x100})) == [4]
+    assert list(_words(code, "memset", {0x100, 0x200})) == [4, 1268]
+    assert not list(_words(code, "memmove", {0x100}))

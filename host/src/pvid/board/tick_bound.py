@@ -118,7 +118,7 @@ def tick_bound(
             ahead += [to for one in calls for to in called(*one)]
     most = dict(run.most)
     for at in reached:
-        words = max(_words(disassembly, names[at], {names[one] for one in reached}), default=0)
+        words = max(_words(disassembly, names[at], reached), default=0)
         most |= {head: max(most[head], words) for head in loops[at] if head in most}
     assumed = _assumed(f"{tool_prefix}addr2line", image, functions, loops, most, limits)
     bounds: dict[int, int] = {}
@@ -210,14 +210,15 @@ def _longest_path(
     return int(np.ceil(-found.fun - 1e-6))
 
 
-def _words(disassembly: str, name: str, callers: set[str]) -> Iterator[int]:
-    """How many words calls of memset or memcpy fill, where their size is a constant: a run may have made others."""
+def _words(disassembly: str, name: str, callers: set[int]) -> Iterator[int]:
+    """How many words calls of memset or memcpy fill, where their size is a constant: a run may have made others. Of
+    callers by their addresses: static functions of two files may have one name."""
     if name not in ("memset", "memcpy"):
         return
-    function, size = "", 0
+    function, size = 0, 0
     for line in disassembly.splitlines():
         if header := _FUNCTION.match(line):
-            function, size = header[2], 0
+            function, size = int(header[1], 16), 0
         elif constant := re.search(r"\tmov(?:s|w|\.w)\s+r2, #(\d+)", line):
             size = int(constant[1])
         elif function in callers and line.endswith(f" <{name}>"):
