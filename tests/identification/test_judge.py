@@ -233,3 +233,10 @@ def test_a_search_that_ran_to_0_does_not_withhold_what_predicts_the_motion(size:
     assert w2.value is not None and w2.se is not None and abs(w2.value - 120.0) < 3 * w2.se < 0.1 * 120.0
     assert answer.values["c"].value is None
     assert {"not_settled", "undetermined"} <= {one.name for one in answer.verdict.reasons}
+
+
+def test_a_prediction_that_runs_away_has_words_and_no_digits() -> None:
+    away = SensorPrediction("i", "A", 1e17, 1e18, 8.7e19)
+    assert str(away) == "i not at all (the simulated motion leaves the measured one without bounds)"
+    assert away.times_noise == "more than 10000"
+    assert SensorPrediction("i", "A", 0.1, 0.5, 312.4).times_noise == "312"

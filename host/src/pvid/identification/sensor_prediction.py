@@ -8,6 +8,9 @@ from typing import Any
 from pvid.base.rounding import part_of_one, percent
 from pvid.base.wording import with_unit
 
+_MOST_TIMES = 10_000  # what is beyond has no digits
+_RUNS_AWAY = 1000.0  # times the motion
+
 
 @dataclass(frozen=True)
 class SensorPrediction:
@@ -35,11 +38,15 @@ class SensorPrediction:
     @property
     def times_noise(self) -> str:
         """The difference over the noise; "": the noise is not known."""
-        return (
-            "" if self.of_noise is None else f"{self.of_noise:.2g}" if self.of_noise < 100 else f"{self.of_noise:.0f}"
-        )
+        if self.of_noise is None:
+            return ""
+        if not self.of_noise < _MOST_TIMES:
+            return f"more than {_MOST_TIMES}"
+        return f"{self.of_noise:.2g}" if self.of_noise < 100 else f"{self.of_noise:.0f}"
 
     def __str__(self) -> str:
+        if not self.of_motion < _RUNS_AWAY:
+            return f"{self.name} not at all (the simulated motion leaves the measured one without bounds)"
         noise = f", {self.times_noise} times the sensor's noise" if self.times_noise else ""
         rms = with_unit(self.rms, self.unit, 2)
         return (
