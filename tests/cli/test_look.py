@@ -250,4 +250,33 @@ def test_stamps_since_1970_in_a_compressed_file_are_in_their_unit(tmp_path: Path
     packed = tmp_path / "topic.csv.gz"
     packed.write_bytes(gzip.compress(plain.read_bytes()))
     survey = surveyed(packed)
-    assert survey.time == "t=time:ns" and survey.recording.sample_rate == 500
+    assert survey.time == "t=time" and survey.recording.sample_rate == 500
+
+
+def test_what_is_set_is_no_sensor_and_a_step_of_a_sensor_is_not_wild(tmp_path: Path) -> None:
+    heaters = [np.repeat(levels, N // 3) for levels in ([0.0, 60.0, 20.0], [0.0, 0.0, 50.0])]
+    slow = [20 + np.cumsum(one) * 1e-3 for one in heaters]
+    lab = written(tmp_path / "lab.csv", "t,Q1,Q2,T1,T2", [numbers(T), *map(numbers, (*heaters, *slow))])
+    assert proposals(surveyed(lab)) == ()  # no arm with the angles q and the torques T
+    coarse = [numbers(np.round(one / 8) * 8) for one in slow]  # steps of a slow motion are those of a sensor
+    cooling = written(tmp_path / "cooling.csv", "t,T [K],Ta [K]", [numbers(T), *coarse])
+    assert [one.mechanism for one in proposals(surveyed(cooling))] == ["cooling"]
+    rest = np.where(np.isin(np.arange(N) % 61, (5, 7, 9)), 101.0, 100.0)
+    file = written(tmp_path / "rest.csv", "t,counts,x", [numbers(T), numbers(rest, 0), numbers(SLOW)])
+    assert surveyed(file).facts[0].remarks == ("has two values alone",)
+
+
+def test_a_note_has_names_and_not_positions(tmp_path: Path) -> None:
+    late = T + np.random.default_rng(1).uniform(-6e-4, 6e-4, N)
+    for count, called in ((2, "sensor 0, which is long beyond measure and sensor 1"), (6, ": 6 columns are")):
+        names = [f"'sensor {k}, which is long beyond measure'".replace("'", '"') for k in range(count)]
+        signals = [numbers(np.sin((3 + k) * late)) for k in range(count)]
+        file = written(tmp_path / "late.csv", ",".join(["t", *names]), [numbers(late, 7), *signals])
+        assert called in surveyed(file).recording.notes[0]
+
+
+def test_stamps_in_microseconds_without_a_unit_are_not_passed_over(tmp_path: Path) -> None:
+    rows = [str(k) for k in range(N)]
+    file = written(tmp_path / "box.csv", "loopIteration,time,x", [rows, numbers(5e5 + 1e6 * T, 0), numbers(SLOW)])
+    survey = surveyed(file)
+    assert survey.time == "t=time:us" and survey.recording.sample_rate == 500

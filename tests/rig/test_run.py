@@ -154,7 +154,7 @@ def test_forty_thousand_rows_load_at_once(tmp_path: Path) -> None:
         (changed(1, "T,PHI,Y"), ["line 1", "'PHI'"]),
         ("\n".join(GOOD[1:]), ["no column", "'1', '2', '3'", "--columns t=1:s,phi=2:rad,y=3:m"]),
         (changed(12, "0.009,0.1,0"), ["line 12", "column t", "repeats"]),
-        ("\n".join([GOOD[0], *random.Random(1).sample(GOOD[1:], len(GOOD) - 1)]), ["column t", "runs back"]),
+        ("\n".join([GOOD[0], *random.Random(1).sample(GOOD[1:], 30)]), ["column t", "runs back"]),
         ("\n".join(["phi,y", *(line.partition(",")[2] for line in GOOD[1:])]), ["no column t (s)", "'# dt = 0.001 s'"]),
         ("\n".join(GOOD[:MIN_ROWS]) + "\n", [f"{MIN_ROWS - 1} rows", f"at least {MIN_ROWS}"]),
     ],

@@ -326,7 +326,7 @@ STRETCHED = uniform(1.0) + 5e-5 * np.sin(np.arange(1000))  # a twentieth of a pe
     ("times", "part"),
     [
         (
-            np.random.default_rng(4).permutation(uniform(1.0)),
+            np.random.default_rng(4).uniform(0.0, 1.0, 1000),
             r"column t: 0.\d+ s runs back from the time before it, 0.\d+ s, as at \d+ more rows",
         ),
         (np.zeros(100), "line 3, column t: 0.0 s repeats the time before it, as all times do"),

@@ -386,7 +386,7 @@ def test_damaged_files_are_one_sentence(name: str, tmp_path: Path) -> None:
         ("a.tdms", "npTDMS"),
         ("a.ulg", "ulog2csv"),
         ("a.wpilog", "AdvantageScope"),
-        ("a.zip", "unpack"),
+        ("a.7z", "unpack"),
         ("a.xls", "save it as .xlsx"),
         ("a.mf4", "asammdf"),
         ("a.dwg", "must end in"),

@@ -79,6 +79,7 @@ _GRAVITY = Unit(Fraction(980_665, 100_000), (0, 1, -2, 0, 0, 0, 0, 0))
 _SPELLINGS = {
     "µ": "u", "μ": "u", "Ω": "ohm", "\u2126": "ohm", "·": "*", "⋅": "*", "×": "*", "²": "^2", "³": "^3", "⁻¹": "^-1",
     "**": "^", "°C": "degC", "°": "deg", "′": "'", " per ": "/",
+    "Deg C": "degC", "deg C": "degC", "Deg F": "degF", "deg F": "degF",
 }  # fmt: skip
 _WORDS = {
     "s": "sec secs second seconds sekunde sekunden seconde secondes",

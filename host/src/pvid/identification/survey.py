@@ -19,7 +19,9 @@ from pvid.identification.wild_samples import MOST_FAR, far_from_median
 from pvid.models.mechanisms import described
 from pvid.models.registry import most_specific
 from pvid.models.registry import names as shipped_names
+from pvid.rig.clock import unit_of_slow
 from pvid.rig.columns import (
+    ALSO_WORDS,
     TIME,
     Channel,
     Column,
@@ -41,15 +43,16 @@ Float = npt.NDArray[np.float64]
 
 _NOBODYS_NAME = "\0"  # what no header contains
 _HELD_SHARE = 0.1  # a column that keeps its value from row to row but in so few is set, not measured
+_ONE_STEP = 1.5  # of the smallest change
 _HELD_SAMPLES = 4  # for which a set value stays, at least
 _FEW_LEVELS = 12
+_FAR_AT_ONCE = 0.2  # of its range: a coarse sensor of a slow motion moves by a step
 _CLIPPED_SAMPLES, _CLIPPED_STRETCHES = 3, 2  # in a row at the end of the range, and how often
 _ROUNDED = 4  # of the samples at the next value: the top of a smooth motion in steps of a sensor has up to 2.5 times
 _AT_THE_END = 0.98  # share of the other stretches of equal samples, in which a clipped one is longer
 _IRREGULAR = 0.3  # scatter of the blank stretches, of their mean
 _EVEN = 0.1  # scatter of the steps from row to row, of their mean
 _BLANK = 0.9  # share of the rows in which what is set is blank
-_EPOCH = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))  # of seconds they are 1.7e9 now
 _BETWEEN = 0.01  # of the samples in the middle of the range: a counter passes it, what is switched does not
 _OF_MOTION = 0.99  # share of a signal's power
 _SPECTRUM = 1 << 17  # samples
@@ -57,7 +60,6 @@ _SI = ("rad", "m", "s", "rad/s", "m/s", "V", "A", "N", "N*m", "K", "Hz", "W", "P
 _OFTEN_OTHER = {"rad/s": ("rpm", 0.0), "rad": ("deg", 3.2)}  # another usual unit, and numbers above which it can be
 _PHASES = {"V": "UW", "A": "BC"}  # of a machine, by letters that are also units
 _NO_NUMBERS = re.compile(r" has 0 rows of data|('.*') is not a number; (\d+) of \2 lines")
-_CONFLICTING = frozenset("m s a k n v h d g c w j t f l in min".split())  # also words of names
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,7 @@ class ColumnFacts:
     remarks : sentences
     is_set : it keeps each value until the next one, as an input
     is_even : it rises by the same step from row to row, as a clock
+    jumps : it is set and goes far at once, as no sensor of a mechanism's motion does
     """
 
     key: str
@@ -86,6 +89,7 @@ class ColumnFacts:
     remarks: tuple[str, ...]
     is_set: bool = False
     is_even: bool = False
+    jumps: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +160,7 @@ def unit_of_name(name: str, names: Sequence[str] = ()) -> str:
     sure |= not {name[:-1] + phase for phase in _PHASES.get(name[-1:], name[-1:])} & {*names, name}
     for si in _SI:
         found = unit_in(name, si)
-        if found is not None and (sure or found.lower() not in _CONFLICTING):
+        if found is not None and (sure or found.lower() not in ALSO_WORDS):
             return found
     return ""
 
@@ -195,7 +199,7 @@ def _read(path: Path, names: Sequence[str], at: int, others: Sequence[int]) -> _
         named = {str(k + 1): Column(_name_of(names, k)) for k in which} | {"t": Column(_name_of(names, at))}
         columns = _AsWritten(channels, named)
         table = read_table(path, columns)
-        unit = "" if columns.stated.get("t") else unit_in(names[at], "s") or _unit_of_epoch(table.t)
+        unit = "" if columns.stated.get("t") else unit_in(names[at], "s") or unit_of_slow(table.t)
         scale = scale_to("s", unit) if unit else None
         if scale is not None:
             table = replace(table, t=Column("", scale.factor, scale.divisor).in_si(table.t))
@@ -224,12 +228,6 @@ def _read(path: Path, names: Sequence[str], at: int, others: Sequence[int]) -> _
 def _name_of(names: Sequence[str], k: int) -> str:
     """As Column has it."""
     return typed(names, k).strip('"')
-
-
-def _unit_of_epoch(t: Float) -> str:
-    """The unit of stamps since 1970, by their size; "" of others."""
-    first = t[np.isfinite(t)][:1]
-    return next((unit for unit, least in _EPOCH if first.size and first[0] > least), "")
 
 
 def _has_changes_alone(values: Float) -> bool:
@@ -273,15 +271,19 @@ def _facts_of(name: str, unit: str, written: Float, recording: Recording, key: s
     if is_set:
         what = f"{levels} values" if levels <= _FEW_LEVELS else f"more than {_FEW_LEVELS} values"
         remarks.append(f"set, not measured: {what}, {len(changes)} changes")
-        return ColumnFacts(key, name, unit, low, high, None, None, tuple(remarks), is_set=True)
+        jumps = bool(np.abs(steps).max(initial=0.0) > _FAR_AT_ONCE * (high - low))
+        return ColumnFacts(key, name, unit, low, high, None, None, tuple(remarks), is_set=True, jumps=jumps)
     there = signal[np.isfinite(signal)]
+    sizes = np.abs(steps[changes])
     far = far_from_median(there, 0.0)
+    if sizes.max() <= _ONE_STEP * sizes.min():
+        far[:] = False  # a sensor between two of its steps
     if far.any() and far.mean() < MOST_FAR:
         values, times = np.unique(there[far], return_counts=True)
         usual = f"{values[np.argmax(times)]:.6g} {unit}".rstrip()
         remarks.append(f"{far.sum()} samples are far from those about them, most often {usual}")
         there = there[~far]
-    remarks += _clipped(x, unit)
+    remarks += _clipped(x, unit) if levels > 2 else ["has two values alone"]
     if blank > 0:
         remarks.append(f"{100 * blank:.2g} % of the rows have no number")
     reaches = _reaches(there, recording.sample_rate)
@@ -370,8 +372,11 @@ def proposals(survey: Survey) -> tuple[Proposal, ...]:
 def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: Mapping[str, str]) -> Proposal | None:
     description = described(mechanism)
     own: dict[str, str] = {}
+    jumping = {one.name for one in survey.facts if one.jumps}
+    moving = {one.name for one in description.signals if one.kind == "sensor" and not one.driven}
     for channel in channels_of(description):
         free = [one for one in measured if one not in own.values() and _fits(stated.get(one), channel.unit)]
+        free = [one for one in free if not (one in jumping and channel.name in moving)]
         same = [one for one in free if one == channel.name]
         alike = same or [one for one in free if channel.is_called(one)] or [one for one in free if stated.get(one)]
         if not alike:

@@ -19,7 +19,7 @@ from pvid.base.errors import PvidError
 from pvid.base.packages import lacking
 from pvid.base.wording import listed, reason, shown
 from pvid.rig.cells import Evidence, is_missing, styles
-from pvid.rig.columns import Columns
+from pvid.rig.columns import Columns, unit_in_name
 from pvid.rig.size import refuse_beyond
 from pvid.rig.table import Table, row_place
 from pvid.rig.times import TimesOfDay, is_time, seconds_of
@@ -140,12 +140,15 @@ def table_of(
     units : of columns by name, as far as the file states them
     """
     places = columns.places(path, names)
-    given = {signal: (units or {}).get(names[place], "") for signal, place in places.items()}
-    found = {signal: column(names[place]) for signal, place in places.items()}
+    given = {
+        signal: (units or {}).get(names[place]) or unit_in_name(names[place], columns.units[signal])
+        for signal, place in places.items()
+    }
+    found = {signal: _array(path, names[place], column(names[place])) for signal, place in places.items()}
     times = _seconds(found["t"])
     if times is not None:
         given.pop("t")
-    columns, notes = columns.in_units_of_file(given)
+    columns, notes = columns.called(names, places).in_units_of_file(given)
     signals: dict[str, FloatArray] = {}
     for signal, place in places.items():
         if signal == "t" and times is not None:
@@ -169,6 +172,17 @@ def table_of(
     return table.rows(kept, lambda row: row_place(int(kept[row])), f"rows without a time, left out: {count}")
 
 
+def _array(path: Path, name: str, data: Any) -> Any:
+    """What numpy takes for an array. Raises PvidError on anything else."""
+    try:
+        array = data if np.ma.isMaskedArray(data) else np.asarray(data)
+    except Exception as error:  # of what calls itself an array
+        raise PvidError(f"{path}, column {name}: one number a sample is wanted: {reason(error)}.") from error
+    if array.ndim == 0:
+        raise PvidError(f"{path}, column {name}: an array of numbers is wanted, not {type(data).__name__}.")
+    return array
+
+
 def numbers_of(path: Path, name: str, data: Any) -> FloatArray:
     """Of an array-like of any kind of real numbers, shape (n,); NaN where one is missing.
 
@@ -177,7 +191,7 @@ def numbers_of(path: Path, name: str, data: Any) -> FloatArray:
     mask = np.ma.getmaskarray(data) if np.ma.isMaskedArray(data) else None
     array = np.asarray(np.ma.getdata(data) if mask is not None else data)
     if array.ndim != 1:
-        if array.ndim == 0 or max(array.shape, default=0) != array.size:
+        if max(array.shape, default=0) != array.size:
             raise PvidError(f"{path}, column {name}: one number a sample is wanted, not shape {array.shape}.")
         array = array.reshape(-1)
     if array.dtype.kind in "biuf":

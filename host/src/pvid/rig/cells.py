@@ -13,7 +13,7 @@ _MISSING = re.compile(
     r"""[+-]?nan\d*(?:\(.*\))?  |  [+-]?1\.\#(?:q?nan|snan|ind|inf)\d*
     |  [+-]?(?:inf|infinity|∞|ol|o\.l\.?|ovl|ovld|ovf|ovfl|ovrflw|over|overload|overrange|overflow|under|underflow)
     |  \#?n/?a  |  \#nv  |  \#(?:div/0|value|num|ref|name)[!?]?  |  null  |  none  |  nil  |  nat  |  missing
-    |  no\ data  |  invalid  |  error  |  err  |  [-–—]+  |  \*+  |  \#+  |  \?+  |  \.""",
+    |  unavailable  |  unknown  |  no\ data  |  invalid  |  error  |  err  |  [-–—]+  |  \*+  |  \#+  |  \?+  |  \.""",
     re.X | re.I,
 )
 _BLANKS = " \xa0\u2009\u202f'’"  # that group digits
@@ -24,7 +24,7 @@ _ANY_NUMBER = re.compile(
     r"[+-]?(?P<digits>\d+[.,]?\d*|[.,]\d+|[1-9]\d{0,2}(?:(?:,\d{3})+(?:\.\d*)?|(?:\.\d{3})+(?:,\d*)?))(?:[eEdD][+-]?\d+)?",
     re.ASCII,
 )
-_WORDS = {"true": 1.0, "false": 0.0}
+_WORDS = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0}
 # Of the cells that decide, those of another style are damaged if they are fewer than this part.
 _DAMAGED = 0.01
 

@@ -19,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import listed
 from pvid.rig.gaps import spread
 from pvid.rig.stamps import with_rising_stamps, without_repeated_rows
 from pvid.rig.table import Table
@@ -209,14 +208,14 @@ def _with_jitter(
         return _placed(table, None, rate, note)
     if stamped_late and _smoother_when_uniform(table, fit):
         note += (
-            f"t departs from a uniform clock {size}, but {listed(table.signals)} are smoother without that: the "
+            f"t departs from a uniform clock {size}, but {table.called()} are smoother without that: the "
             f"samples are taken as uniform at {rate:g} Hz",
         )
         return _placed(table, fit.ticks, rate, note)
     # the recorded times are believed: any rate near theirs will do
     rate = promised if promised is not None else _shortest_decimal(1 / fit.period, 1e-3)
     t, signals = interpolated(table, rate, fit.period)
-    text = f"t jitters {size}: {listed(table.signals)} are interpolated at {rate:g} Hz from the recorded times"
+    text = f"t jitters {size}: {table.called()} are interpolated at {rate:g} Hz from the recorded times"
     long = int(np.count_nonzero(np.diff(table.t) > _GAP_PERIODS * fit.period))
     if long:
         text += f"; steps longer than {_GAP_PERIODS:g} periods, of late samples or missing ones: {long}"
@@ -411,10 +410,20 @@ def _cause(name: str, ratio: float, measured: float) -> str:
 
 def _unit(name: str, rate: float) -> str:
     """What unit t is in, likely, where its rate in seconds [Hz] is impossible."""
-    for unit, per_second in CLOCKS.items():
-        if USUAL_RATES[0] <= rate * per_second <= USUAL_RATES[1]:
-            return f": t looks like {unit}: use --columns t={name}:{unit}"
-    return " (is t in seconds?)"
+    unit = _likely(rate)
+    return f": t looks like {unit}: use --columns t={name}:{unit}" if unit else " (is t in seconds?)"
+
+
+def _likely(rate: float) -> str:
+    usual = (unit for unit, parts in CLOCKS.items() if USUAL_RATES[0] <= rate * parts <= USUAL_RATES[1])
+    return next(usual, "")
+
+
+def unit_of_slow(t: FloatArray) -> str:
+    """The likely unit of stamps [n] whose rate in seconds is too small for any recording; "" of others."""
+    steps = np.diff(t[np.isfinite(t)])
+    step = float(np.median(steps)) if steps.size else 0.0
+    return _likely(1 / step) if step > 1 / _RATE_RANGE_HZ[0] else ""
 
 
 def _shortest_decimal(value: float, tolerance: float) -> float:

@@ -38,6 +38,9 @@ class Channel:
 
     def is_called(self, name: str) -> bool:
         """Whether a column of this name is likely to be the signal."""
+        probe = _PROBE.fullmatch(name.strip())
+        if probe is not None and probe["node"] != "t" and not is_unit(probe["node"]):
+            return probe["node"] == self.name and probe["what"] == self.unit.replace("A", "I")
         own = rf"^{re.escape(self.name)}([\s_(\[].*)?$"
         usual = self.usual or "|".join(filter(None, (own, _USUAL_NAMES.get(self.unit))))
         return re.search(usual, name, re.I) is not None
@@ -52,7 +55,12 @@ def of_set_value(name: str) -> int:
 _MEASURED = frozenset("ist act actual meas measured fbk feedback".split())
 _SET = frozenset("soll set setpoint sp ref reference cmd command commanded target des desired".split())
 
-TIME = Channel("t", "s", usual=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
+TIME = Channel(
+    "t",
+    "s",
+    usual=r"^t$|^t[^a-z]|^ts$|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec|^sek|elapsed|^x[_-](value|axis)"
+    r"|created_at|last_changed|\bdoy\b|day.of.year|julian|^m?jd$",
+)
 
 # What people call a signal of a unit, besides its own name.
 _USUAL_NAMES = {
@@ -66,8 +74,11 @@ _USUAL_NAMES = {
     "N*m": r"torque|moment|drehmoment",
 }
 
+_PROBE = re.compile(r"(?P<what>[VI])\((?P<node>\w+)\)")  # of a circuit simulator: V(out), I(R1)
 _UNIT_AT_END = re.compile(r"(?:^|[\s_.\-/(\[])(?P<unit>[a-zµμ°]+)[)\]]?\s*$", re.I)
 _IN_BRACKETS = re.compile(r"[\[(](?P<unit>[^\[\]()]+)[\])]\s*$")
+_BEHIND_SIGN = re.compile(r"(?:\sin\s+|,\s*|(?<=\w)\s?/\s?)(?P<unit>[^\s,].*?)\s*$")  # `U in V`, `Force, N`, `I/mA`
+ALSO_WORDS = frozenset("m s a k n v h d g c w j t f l in min".split())  # units that are also words of names
 _LONG = 24  # characters of a name that is typed
 _PART = re.compile(r'(?:[^,"]|"(?:[^"]|"")*"?)+')
 _ASSIGNED = re.compile(
@@ -166,6 +177,12 @@ class Columns:
             if column.unit_given or not unit.strip():
                 continue
             scale = scale_to(self.units[signal], unit)
+            if spelled(unit) == "%" and self.units[signal]:
+                name, si = column.name, self.units[signal]
+                raise PvidError(
+                    f"column {shown(name)} is in %, and {signal} in {si}: --columns {signal}=NAME:NUMBER has what 1 % "
+                    f"is in {si}, such as 0.12 where 100 % are 12 {si}"
+                )
             if scale is None:
                 unknown.append(f"{shown(unit)} of column {shown(column.name)}")
                 continue
@@ -177,6 +194,15 @@ class Columns:
             what = "is no unit of its signal" if len(unknown) == 1 else "are no units of their signals"
             notes += (f"{listed(unknown)} {what}: taken as SI unless --columns has a unit",)
         return replace(self, named=MappingProxyType(named)), notes
+
+    def called(self, names: Sequence[str], places: Mapping[str, int]) -> Columns:
+        """With the names of the file's columns for those that were typed by position, where a sentence can use them."""
+        own = {
+            signal: replace(column, name=names[places[signal]])
+            for signal, column in self.named.items()
+            if column.name.isdecimal() and names.count(names[places[signal]]) == 1 and names[places[signal]].strip()
+        }
+        return replace(self, named=MappingProxyType({**self.named, **own}))
 
     @property
     def wanted(self) -> tuple[str, ...]:
@@ -308,6 +334,18 @@ def unit_in(name: str, si: str) -> str | None:
         return None
     unit = spelled(match["unit"])
     return unit if scale_to(si, unit) is not None else None
+
+
+def unit_in_name(name: str, si: str) -> str:
+    """The unit that a column's name states beyond doubt for a signal in an SI unit: in brackets (of any dimension),
+    behind a sign, or at its end (`angle_deg`, but not `x_in`); "" where there is none."""
+    if found := unit_in_brackets(name):
+        return found
+    behind = _BEHIND_SIGN.search(name)
+    if behind is not None and scale_to(si, behind["unit"]) is not None:
+        return behind["unit"]
+    at_end = unit_in(name, si) or ""
+    return at_end if at_end.lower() not in ALSO_WORDS or (si, at_end) == ("s", "min") else ""
 
 
 def unit_in_brackets(name: str) -> str:

@@ -25,7 +25,7 @@ from pvid.base.errors import PvidError
 from pvid.base.units import scale_to
 from pvid.base.wording import listed, shown
 from pvid.rig.cells import PLAIN, Evidence, Style, is_missing, is_number, style_note, styles
-from pvid.rig.columns import TIME, Columns, MissingColumnError, unit_in, unit_in_brackets
+from pvid.rig.columns import TIME, Columns, MissingColumnError, unit_in, unit_in_name
 from pvid.rig.layout import Layout, counts_up, find, split
 from pvid.rig.printed_table import printed
 from pvid.rig.size import refuse_beyond
@@ -50,6 +50,20 @@ _FEW = 32  # lines: what numpy refuses is halved down to so many
 _COMMAS = ", as if the comma separated columns and were the decimal sign as well"
 _NO_NUMBER = (9.9e37, 9.91e37)  # an overload and no number in SCPI, the language of instruments
 
+_SEEN = 4096  # bytes that what is no table is recognised from
+_CAN = "CAN frames as bytes, which a data base of the bus turns into signals: `cantools decode --single-line DBC`"
+_NO_TABLES = {
+    re.compile(rb"\s*date [^\n]*\n\s*base (?:hex|dec)"): f"a Vector log of {_CAN}, or export the signals as CSV",
+    re.compile(rb"\s*\(\d+\.\d+\)\s+\w+\s+[0-9A-Fa-f]+(?:#[0-9A-FR#]*|\s+\[\d+\](?:\s+[0-9A-Fa-f]{2})*)\s*\n"): (
+        f"a candump log of {_CAN}"
+    ),
+    re.compile(rb"FMT, ?\d+, ?\d+, ?FMT|\d{4}-\d\d-\d\d [^\n{]*: \w+ \{\w+ : "): (
+        "a log of ArduPilot: `mavlogdump.py --format csv --types TYPE RUN.BIN` of the Python package pymavlink writes "
+        "the messages of one type as CSV"
+    ),
+    re.compile(rb"\s*(?:<!DOCTYPE html|<html|<table)", re.I): "a page of HTML: save its table as CSV",
+}
+
 _NO_DATA = re.compile(rb"(?m)^[ \t]*(?:[#%]|//|sep=)")
 _BLANK_CELL = {
     separator: re.compile(
@@ -70,6 +84,10 @@ def read_csv(path: Path, columns: Columns) -> Table:
 
 def text_table(path: Path, columns: Columns, lines: Callable[[], Iterator[bytes]], line: str = "line") -> Table:
     """Reads a table of what begins to give blocks of lines anew at every call; `line` is what its lines are called."""
+    first = next(lines(), b"")[:_SEEN]
+    for form, how in _NO_TABLES.items():
+        if form.match(first):
+            raise PvidError(f"{path} is {how}.")
     try:
         return _TextTable(path, columns, lines, line).read()
     except PvidError as error:
@@ -138,7 +156,8 @@ class _TextTable:
         if max(self._places.values()) >= layout.width:
             raise PvidError(f"{path}{where}: more names than the lines below have cells, {layout.width}.")
         units = {
-            signal: (layout.units[place] if place < len(layout.units) else "") or unit_in_brackets(layout.names[place])
+            signal: (layout.units[place] if place < len(layout.units) else "")
+            or unit_in_name(layout.names[place], columns.units[signal])
             for signal, place in self._places.items()
         }
         rows = (layout.cells(line) for line in lines[layout.body - 1 :])
@@ -159,7 +178,7 @@ class _TextTable:
                     notes = (f"{name} is taken in s; in {unit}, --columns t={name}:{unit}, a row would be each {step}",)
                 else:
                     notes, units["t"] = (f"{name} is in {unit}: a row each {step}",), unit
-        self._columns, of_units = columns.in_units_of_file(units)
+        self._columns, of_units = columns.called(layout.names, self._places).in_units_of_file(units)
         self._notes = (*_front_note(lines, layout), *notes, *of_units)
         self._sample = body
 
@@ -564,6 +583,11 @@ class _Reader:
         if not ended and len(self._damaged) <= max(_EARLY, self._rows):
             return
         within = self._within() if self._rows else sorted(self._damaged)
+        behind = sorted(one for one in self._damaged if one > self._last_row) if ended and self._rows else []
+        if len(behind) > max(_DAMAGED_LINES, _DAMAGED_SHARE * self._rows) and behind[0] == self._last_row + 1:
+            cells = self._layout.cells(self._damaged[behind[0]][0]) or []
+            if 2 * sum(map(is_number, cells)) >= self._layout.width:
+                within = behind  # rows of another form, and no footer
         most = max(_DAMAGED_LINES, int(_DAMAGED_SHARE * (self._rows + len(within)))) if self._rows else 0
         if len(within) > most:
             complaint = self._damaged[within[0]][1]

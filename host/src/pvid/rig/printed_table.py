@@ -24,6 +24,7 @@ _TOKEN = re.compile(rf"(?<![A-Za-z_\d.^]){_TIME}|(?<![A-Za-z_\d.^])(?:{_NUMBER})
 _LABEL = re.compile(r"([^\W\d][\w.]*)[\"']?\s*[:=]\s*[\"'(\[{\-\s]*$")
 _UNIT = re.compile(r"\s?([A-Za-zµμ°%Ω][\w/*^°µ²%]*)(?!\s*[:=\w])")
 _LONE_SIGN = re.compile(r"[=(\[,;]\s*-\s+$")
+_SINCE_1970 = re.compile(r"[1-3]\d{9}(?:\d{3}){0,3}(?:\.\d+)?")  # in seconds or parts of one
 _RECORD_ENDS = re.compile(rb"(?m)^---\s*$")
 _SECONDS, _PARTS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
 
@@ -47,7 +48,8 @@ def printed(blocks_of: Callable[[], Iterator[bytes]]) -> Printed | None:
     labels = [_LABEL.search(one) for one in usual[:-1]]
     names = [str(k + 1) if one is None else one[1] for k, one in enumerate(labels)]
     stamp = next(line for line, between in text if between == usual)
-    if any(one == "," or _LONE_SIGN.search(one) for one in _TOKEN.split(stamp)):
+    head = _head([line for line, _ in text], stamp, len(names))
+    if any((one == "," and head is None) or _LONE_SIGN.search(one) for one in _TOKEN.split(stamp)):
         return None  # decimal commas; a sign apart from its number
     if labels[0] is None and re.match(_TIME, _TOKEN.findall(stamp)[0]):
         names[0] = "time" if "t" in names else "t"
@@ -55,7 +57,10 @@ def printed(blocks_of: Callable[[], Iterator[bytes]]) -> Printed | None:
     if joined is not None:
         names[joined : joined + 2] = ["stamp" if "t" in names else "t"]
     elif not any(labels):
-        names = _head([line for line, _ in text], stamp, len(names)) or names
+        names = head or names
+    elif "t" not in names:
+        names = ["t" if one.isdecimal() and _SINCE_1970.fullmatch(cell) else one
+                 for one, cell in zip(names, _TOKEN.findall(stamp), strict=True)]  # fmt: skip
     found = [_UNIT.match(one) for one in usual[1:]]
     units = [one[1] if one is not None and is_unit(one[1]) else "" for one in found]
     if joined is not None:

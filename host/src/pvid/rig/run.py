@@ -37,8 +37,11 @@ from pvid.rig.gaps import (
     stretches,
     ticks_between,
 )
+from pvid.rig.json_table import read_json
 from pvid.rig.mcap_table import read_mcap
-from pvid.rig.table import Table, row_place
+from pvid.rig.octave_table import is_octave, read_octave
+from pvid.rig.stamps import in_seconds
+from pvid.rig.table import Table, called, row_place
 from pvid.rig.text_lines import is_text
 from pvid.rig.tree_table import read_hdf5, read_matlab
 from pvid.rig.turns import counted_on, joined
@@ -172,7 +175,7 @@ def read_table(path: Path, columns: Columns) -> Table:
             raise PvidError(f"{path} does not exist.")
         if not path.is_file():
             raise PvidError(f"{path} is not a regular file.")
-        return _forward(_read_as(path)(path, columns))
+        return _forward(in_seconds(_read_as(path)(path, columns)))
     except (OSError, ValueError) as error:
         raise PvidError(f"{path} cannot be read: {reason(error)}.") from error
     except MemoryError as error:
@@ -199,7 +202,8 @@ def recording_of_arrays(
     """
     names = [str(one) for one in named]
     arrays = dict(zip(names, named.values(), strict=True))
-    return _recording(_checked(_forward(table_of(Path(name), names, arrays.__getitem__, columns))), rate)
+    table = table_of(Path(name), names, arrays.__getitem__, columns)
+    return _recording(_checked(_forward(in_seconds(table))), rate)
 
 
 def write_recording(path: str | os.PathLike[str], recording: Recording, channels: tuple[Channel, ...]) -> None:
@@ -339,14 +343,14 @@ def _bridged(clocked: Uniform, table: Table) -> Recording:
             gaps.setdefault((firsts.tobytes(), ends.tobytes()), []).append(name)
     for (firsts_of, ends_of), names in gaps.items():
         firsts, ends = np.frombuffer(firsts_of, np.int64), np.frombuffer(ends_of, np.int64)
-        own = "" if len(names) == len(signals) else f" of {listed(table.columns[one].name for one in names)}"
+        own = "" if len(names) == len(signals) else f" of {called([table.columns[one].name for one in names])}"
         filled = np.logical_and.reduce([np.isfinite(signals[name][firsts]) for name in names])
         notes += _gap_notes(clocked, own, firsts, ends, filled)
     whole = np.logical_and.reduce([np.isfinite(one) for one in signals.values()])
     if whole.all():
         return Recording(clocked.t, signals, rate, tuple(notes), slow)
     if not whole.any():
-        raise PvidError(f"{table.path}: no row has numbers of {listed(signals)} at the same time.")
+        raise PvidError(f"{table.path}: no row has numbers of {table.called()} at the same time.")
     part = slice(int(np.argmax(whole)), whole.size - int(np.argmax(whole[::-1])))
     common = {name: np.where(whole, one, np.nan)[part] for name, one in signals.items()}
     return Recording(clocked.t[part], common, rate, tuple(notes), slow)
@@ -380,6 +384,7 @@ _READERS: dict[str, Callable[[Path, Columns], Table]] = {
     ".npz": read_npz,
     ".parquet": read_parquet,
     **dict.fromkeys((".feather", ".arrow"), read_arrow),
+    **dict.fromkeys((".json", ".jsonl", ".ndjson"), read_json),
     ".mat": read_matlab,
     **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
     **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
@@ -398,10 +403,8 @@ _CONVERTED = {
     ".blf": "CAN: export the decoded signals as CSV",
     ".xls": "save it as .xlsx",
     ".ods": "save it as .xlsx",
-    ".json": "write its rows as CSV",
     ".npy": "numpy.savez('RUN.npz', t=..., and an array for each signal)",
     ".pkl": "write the data frame with to_parquet or to_csv",
-    ".zip": "unpack it",
     ".tar": "unpack it",
     ".7z": "unpack it",
 }
@@ -415,6 +418,8 @@ _WRITERS: dict[str, Callable[[Path, dict[str, FloatArray]], bytes]] = {
 
 def _read_as(path: Path) -> Callable[[Path, Columns], Table]:
     """The reader of a file: that of its suffix, and that of text tables for text with another one."""
+    if path.is_file() and is_octave(path):
+        return read_octave
     if path.is_file() and not is_run(path) and path.suffix.lower() not in _CONVERTED and is_text(path):
         return read_csv
     return _format(path, _READERS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,17 +11,28 @@ import numpy.typing as npt
 from pvid.rig.gaps import longest_bridged
 from pvid.rig.table import Table
 
+FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 # Periods of the counters that time stamps come from [s], and in the column's own unit.
 _COUNTERS = [2.0**bits * tick for bits in (16, 24, 32) for tick in (1e-9, 1e-6, 1e-3)]
 _COUNTS = [2.0**bits for bits in (16, 24, 32)]
+_CLOCKS = (1.0, 60.0, 3600.0, 86_400.0)  # fractions of a second, seconds of a minute, ... [s]
+# Stamps of 2001 to 2100 since 1970, in parts of a second, whose rows follow each other within so many seconds.
+_SINCE_1970, _LONGEST_STEP = (1e9, 4.1e9), 20.0
+_PARTS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
+# Days of 2000 to 2050 since the beginning of 1900, -4712, 1858 and 0: of spreadsheets, of astronomers, of MATLAB.
+_DAYS = ((36_526.0, 54_790.0), (2_451_544.0, 2_469_808.0), (51_544.0, 69_808.0), (730_486.0, 748_750.0))
+_DAY_S = 86_400.0
+_FAST = 1e-4  # [s]
+_OF_DAYS = re.compile(r"\bdoy\b|day.?of.?(the.?)?year|julian|\bm?jd\b|^days?$|datenum|serial.?(date|day)", re.I)
 # A wrap leaves a step that is the usual one within this part, or both ends of the counter's range beside it.
 _USUAL_PART = 0.25
 _AT_ENDS = 50.0  # usual steps
 _LEAST_TICKS = 8.0  # usual steps of a counter's period
 _REGULAR_PART = 0.5  # of a step, that rows brought to their place may depart
 _FARTHEST = 16  # rows that a row out of order stands from its place
+_SHUFFLED = 0.05  # of the steps run back: the rows are in the order of something else
 _WILD_SHARE = 0.01  # of the stamps, at most
 _SEGMENT_ROWS = 50  # rows of a segment, as a rule: with more jumps the stamps mean nothing
 # Ticks between segments, at least: no gap is interpolated over so many. Longer pauses are shortened where more of the
@@ -29,6 +41,47 @@ _APART = 64
 _SLOW_SAMPLES = 4  # of the slowest sensor between two segments
 # So few rows are taken for repeated, of all; of more only where hardly another row is like the one before it.
 _FEW_REPEATED, _RESTING = 0.01, 0.1
+
+
+def in_seconds(table: Table) -> Table:
+    """A table whose stamps are seconds, with a note where neither the file nor the user stated their unit and their
+    name or size does: days, or parts of a second since 1970."""
+    column = table.columns["t"]
+    t = table.t[np.isfinite(table.t)]
+    if column.unit_given or (column.factor, column.divisor) != (1.0, 1.0) or t.size < 2:
+        return table
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.abs(np.diff(t))
+        period = float(t[-1] - t[0]) / (t.size - 1)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    if not 0 < step < np.inf:
+        return table
+    for unit, parts in _PARTS.items():
+        low, high = _SINCE_1970
+        if low <= t[0] / parts < high and step / parts <= _LONGEST_STEP:
+            return _scaled(table, 1 / parts, f"{column.name} is taken as {unit} since 1970, by its size")
+    if _OF_DAYS.search(column.name) and step < 1:
+        return _scaled(table, _DAY_S, f"{column.name} is taken as days, by its name")
+    if not period > 0 or not any(low <= t[0] < high for low, high in _DAYS):
+        return table
+    error = max(1e-7, 8 * float(np.spacing(t[-1])) / (period * (t.size - 1)))
+    seconds = period * _DAY_S
+    in_seconds_too = _is_round(period, error) or _is_round(1 / period, error)
+    multiple = max(seconds, 1 / seconds)
+    whole = period < _FAST and abs(multiple - round(multiple)) < 1e3 * error * multiple
+    if (whole or not in_seconds_too) and _is_round(seconds, 1e3 * error):
+        return _scaled(table, _DAY_S, f"{column.name} is taken as days, by its size and its steps")
+    return table
+
+
+def _is_round(value: float, error: float) -> bool:
+    """Whether a number has three digits at most, within a relative error."""
+    return abs(float(f"{value:.3g}") / value - 1) <= error
+
+
+def _scaled(table: Table, factor: float, note: str) -> Table:
+    values = table.t / round(1 / factor) if factor < 1 else table.t * factor
+    return replace(table, t=values, notes=(*table.notes, f"{note}: --columns with a unit says otherwise"))
 
 
 def with_rising_stamps(table: Table) -> Table:
@@ -53,6 +106,16 @@ def with_rising_stamps(table: Table) -> Table:
 def _unwrapped(table: Table, usual: float) -> Table:
     t, steps = table.t, np.diff(table.t)
     unit = abs(float(table.columns["t"].in_si(np.ones(1))[0]))
+    for period in _CLOCKS:
+        over = steps[steps < 0] + period
+        if over.size and (np.abs(over - usual) <= _USUAL_PART * usual).all() and t.min() >= 0 and t.max() < period:
+            if t[0] <= usual:
+                return table  # segments of that length, or a clock that began with the run
+            name = table.columns["t"].name
+            note = f"{name} starts over after {period:.10g} s, {over.size} times: joined (a part of a clock's time)"
+            return replace(
+                table, t=t + period * np.concatenate([[0], np.cumsum(steps < 0)]), notes=(*table.notes, note)
+            )
     for period in sorted({*_COUNTERS, *(unit * counts for counts in _COUNTS)}):
         back = np.flatnonzero(steps < -period / 2)
         if not back.size or period < _LEAST_TICKS * usual:
@@ -75,17 +138,22 @@ def _unwrapped(table: Table, usual: float) -> Table:
 
 
 def _sorted(table: Table, usual: float) -> Table:
-    """Rows that stand a few rows from their place are brought there if the stamps are then as regular as the others."""
-    if not (np.diff(table.t) < 0).any():
+    """Rows that stand a few rows from their place are brought there if the stamps are then as regular as the others;
+    rows in the order of another column, if their stamps are a uniform clock without a gap."""
+    back = int(np.count_nonzero(np.diff(table.t) < 0))
+    if not back:
         return table
     order = np.argsort(table.t, kind="stable")
     moved = np.flatnonzero(order != np.arange(order.size))
+    rising = np.diff(table.t[order])
+    if back > _SHUFFLED * rising.size and np.ptp(rising) < _REGULAR_PART * rising.mean():
+        note = f"the rows are not in the order of {table.columns['t'].name}: sorted by it"
+        return replace(table.rows(order, lambda row: table.place(int(order[row])), note), t=table.t[order])
     if np.abs(order[moved] - moved).max() > _FARTHEST or moved.size > order.size * _FARTHEST * _WILD_SHARE:
         return table
     beside = np.unique(np.clip(np.concatenate([moved, moved - 1]), 0, order.size - 2))
     if np.abs(np.diff(table.t[order])[beside] / usual - 1).max() > _REGULAR_PART:
         return table
-    back = int(np.count_nonzero(np.diff(table.t) < 0))
     note = f"rows out of order: {back} (first: {table.place(int(moved[0]))}), sorted by {table.columns['t'].name}"
     return replace(table.rows(order, lambda row: table.place(int(order[row])), note), t=table.t[order])
 

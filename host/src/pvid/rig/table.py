@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,10 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.rig.columns import Columns
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+_FEW_NAMES = 4
+
+
+def called(names: Sequence[str]) -> str:
+    """Some columns in a sentence: their names, or how many they are."""
+    return listed(names) if len(names) <= _FEW_NAMES else f"{len(names)} columns"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +54,10 @@ class Table:
         """Whether every signal has a number in the row, shape (n,)."""
         there: npt.NDArray[np.bool_] = np.all([np.isfinite(one) for one in self.signals.values()], axis=0)
         return there
+
+    def called(self) -> str:
+        """What a sentence calls the signals: as the file does, or by their number where they are many."""
+        return called([self.columns[one].name for one in self.signals])
 
     def rows(self, kept: slice | IntArray, place: Callable[[int], str], note: str) -> Table:
         """Some of the rows, with a note on the others."""

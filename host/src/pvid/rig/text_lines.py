@@ -6,20 +6,23 @@ that garbage from a serial port does not change the encoding of the rest.
 
 from __future__ import annotations
 
+import bz2
 import codecs
 import gzip
+import lzma
 import re
+import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, cast
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import reason
+from pvid.base.wording import listed, reason, shown
 
 BLOCK = 1 << 20  # bytes read at a time, and the longest line
 
-_GZIP = b"\x1f\x8b\x08"
+_PACKED = {"gzip": b"\x1f\x8b\x08", "bzip2": b"BZh", "xz": b"\xfd7zXZ\0", "zip": b"PK\x03\x04"}
 _SEEN = 4096  # bytes that the encoding is found from
 # Of UTF-16 text of mostly ASCII characters, every second byte is zero.
 _ZEROS = 0.4
@@ -31,19 +34,50 @@ _CONTROL = re.compile(rb"[\0-\x06\x0e-\x1a\x1c-\x1f]")
 def blocks(path: Path) -> Iterator[bytes]:
     """The text in blocks of whole lines, each line ended by one newline but perhaps the last.
 
-    Raises PvidError where the file is no text, or a gzip file that is not whole.
+    Raises PvidError where the file is no text, or a compressed file that is not whole.
     """
     try:
-        with path.open("rb") as plain:
-            zipped = path.name.lower().endswith(".gz") or plain.read(3) == _GZIP
-        with gzip.open(path, "rb") if zipped else path.open("rb") as file:
-            yield from _lines(path, cast("BinaryIO", file))
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise PvidError(f"{path} is not a whole gzip file: {reason(error)}.") from error
+        with _opened(path) as file:
+            yield from _lines(path, file)
+    except (gzip.BadGzipFile, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile) as error:
+        kind = _packed(path) or "gzip"
+        raise PvidError(f"{path} is not a whole {kind} file: {reason(error)}.") from error
+
+
+def _packed(path: Path) -> str:
+    """How a file is compressed; "" where it is not."""
+    with path.open("rb") as file:
+        first = file.read(8)
+    return next((kind for kind, mark in _PACKED.items() if first.startswith(mark)), "")
+
+
+def _opened(path: Path) -> BinaryIO:
+    """What is in a file, without its compression; of an archive its one file outside of folders.
+
+    Raises PvidError where an archive has none or several.
+    """
+    kind = _packed(path)
+    if kind == "gzip" or path.name.lower().endswith(".gz"):
+        return cast("BinaryIO", gzip.open(path, "rb"))
+    if kind == "bzip2":
+        return cast("BinaryIO", bz2.open(path, "rb"))
+    if kind == "xz":
+        return cast("BinaryIO", lzma.open(path, "rb"))
+    if kind != "zip":
+        return path.open("rb")
+    archive = zipfile.ZipFile(path)
+    names = [one for one in archive.namelist() if not one.endswith("/")]
+    outer = [one for one in names if one.count("/") == min(name.count("/") for name in names)]
+    if len(outer) != 1:
+        count = f"{len(outer)} files: {listed(map(shown, outer[:4]))}" if outer else "no file"
+        raise PvidError(f"{path} holds {count}; unpack it and name the recording.")
+    return cast("BinaryIO", archive.open(outer[0]))
 
 
 def is_text(path: Path) -> bool:
     """Whether a file begins as text in an encoding that `blocks` reads."""
+    if _packed(path):
+        return True
     with path.open("rb") as file:
         first = file.read(_SEEN)
     mark, encoding = _encoding(first)
@@ -55,7 +89,7 @@ def _lines(path: Path, file: BinaryIO) -> Iterator[bytes]:
     mark, encoding = _encoding(first)
     first = first[mark:]
     decoder = codecs.getincrementaldecoder(encoding)("replace") if encoding else None
-    rest, line = b"", 1
+    rest, line, padded = b"", 1, False
     data = first
     while data:
         if decoder is not None:
@@ -63,6 +97,10 @@ def _lines(path: Path, file: BinaryIO) -> Iterator[bytes]:
         if data.endswith(b"\r"):
             following = file.read(1 if decoder is None else 2)
             data += following if decoder is None else decoder.decode(following).encode("utf-8", "replace")
+        bare = data.rstrip(b"\0") if decoder is None else data  # what a card was filled with
+        if padded and bare:
+            rest += b"\0"  # no number goes on behind it
+        padded, data = len(bare) < len(data) or (padded and not bare), bare
         if line == 1 and not rest and len(_CONTROL.findall(data)) > _CONTROL_SHARE * len(data):
             at = data.count(b"\n", 0, cast("re.Match[bytes]", _CONTROL.search(data)).start())
             raise PvidError(f"{path}, line {line + at}: zero bytes or control characters, so this is not a text file.")

@@ -7,7 +7,7 @@ has a column each: `data[1]`, `data[2]`, ..., as MATLAB counts.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +93,12 @@ def _of_structure(name: str, value: Any) -> Iterator[tuple[str, Array]]:
         long = array if array.shape[0] >= array.shape[1] else array.T  # MATLAB's order is the other one in HDF5
         for k in range(long.shape[1]):
             yield f"{name}[{k + 1}]", long[:, k]
+
+
+def table_of_arrays(path: Path, arrays: Mapping[str, Array], columns: Columns) -> Table:
+    """The signals among arrays by name: a matrix is a column each. Raises PvidError as `table_of`."""
+    found = {one: array for name, whole in arrays.items() for one, array in _of_structure(name, whole)}
+    return _table(path, found, columns, {})
 
 
 def _table(path: Path, arrays: dict[str, Array], columns: Columns, units: dict[str, str]) -> Table:
