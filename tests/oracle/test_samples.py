@@ -97,6 +97,18 @@ def test_coarse_counts_at_the_turns_of_a_tone_are_no_limit(counts: int, rate: in
     assert clipped(model, sensor, {"x": np.minimum(counted, 0.75), "F": force})
 
 
+@pytest.mark.parametrize("deceleration", [0.3, 1.0, 4.0])
+def test_a_stop_by_friction_is_no_limit(deceleration: float) -> None:
+    """It stays at its largest value until the force turns it; at the end of its way it would not have slowed down."""
+    model = compiled_of("mass_on_spring")
+    k = np.arange(600.0)
+    since_stop = np.maximum(np.maximum(300 - k, k - 340), 0)
+    x: Float = np.round(-deceleration * since_stop**2 / 2)
+    sensor = replace(model.signal("x"), resolution=1.0)
+    assert not clipped(model, sensor, {"x": x, "F": x})
+    assert clipped(model, sensor, {"x": np.minimum(x, -30 * deceleration), "F": x})
+
+
 def test_record_of_a_drive_that_clips_is_noted_where_the_equations_do_not_explain_the_run() -> None:
     """Not where the drive itself may end there: of what comes to it in steps, or with equations that hold."""
     shipped = simulation_of("dc_motor")

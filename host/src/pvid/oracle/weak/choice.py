@@ -51,6 +51,9 @@ _JOINT = 1.5
 # Above this the equations' own errors are estimated when designs are compared.
 MODEL_ERROR = 5.0
 
+# Of a parameter, to which it has fallen where it may be 0; and its standard error where it is sure.
+_NONE, _SURE = 0.01, 0.3
+
 # Part of a row that the equations explain, below which they are those of another mechanism, or of other signals: what
 # smoothing and the number of functions trade, noise against motion, is not what is wrong. In nine recordings of real
 # machines that have an answer the best length of window explains 0.78 and more of each row.
@@ -222,7 +225,16 @@ def ranked(
     if found[0].near_0 and not found[0].is_hopeless:
         found += _ranked(model, run, sample_rate, start, equation_error, reversals, (_SHORT_RUN,))
         found.sort(key=_order)
-    return found
+    best = next((one for one in found if _contradicts(one, found[0])), found[0])
+    return [best, *(one for one in found if one is not best)]
+
+
+def _contradicts(one: Scored, other: Scored) -> bool:
+    """Whether a parameter that may be 0 in a design, whose residuals are no noise, is sure in one that explains more:
+    a part that the equations miss may make a mechanism of fewer bodies fit some windows best."""
+    if not other.near_0 or other.chi2 < MODEL_ERROR or one.near_0 or not one.known or one.chi2 > other.chi2:
+        return False
+    return bool(np.any((other.p < _NONE * one.p) & (one.error < _SURE * one.p)))
 
 
 def _ranked(

@@ -19,13 +19,13 @@ from pvid.oracle.weak.blur import shift_of
 from pvid.oracle.weak.choice import Scored, basis_of, ranked
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.drift import with_drift
-from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
 from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.library import Library
-from pvid.oracle.weak.missing import MOST, Explained, Missing, explained
+from pvid.oracle.weak.missing import MOST, NOISE, Explained, Missing, explained
 from pvid.oracle.weak.naming import of_missing, of_unexplained
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows, record_of
 from pvid.oracle.weak.rows import ready as ready
@@ -241,6 +241,8 @@ def _judged(
         if alone.is_found:
             own, weighted_anew = alone, False
     own = estimated_near_zero(own, weighted_anew, compensate)
+    if own.fit.rows.windows < rows.windows and own.found.chi2 < NOISE:
+        own = attempted(lambda: _of_all_windows(run, used, rows, own, weighted_anew, compensate)) or own
     fit, found = own.fit, own.found
     attempt = Attempts()
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
@@ -280,7 +282,8 @@ def _judged(
             if named is not None:
                 if named.complete:  # what is named explains a time constant within a sample, too
                     reasons = [one for one in reasons if one.name != "rate"]
-                    for shift in (named.fit.p - fit.p, named.further.p - fit.p, *named.instead):
+                    lacking = lacking.by_fit(named.fit.p)
+                    for shift in (named.further.p - fit.p, *named.instead):
                         lacking = lacking.also(shift)
                 lost = [k for k, one in enumerate(judged) if one.status == "not_identified"]
                 reasons += of_missing(fit, lacking, named, min(found.r2), lost)
@@ -322,6 +325,23 @@ def _judged(
         named=named,
         shifts=np.zeros((0, len(se))) if lacking is None else lacking.shifts,
     )
+
+
+def _of_all_windows(
+    run: Mapping[str, npt.ArrayLike],
+    used: WeakDesign,
+    rows: WeakRows,
+    own: Assessed,
+    with_error: bool,
+    compensate: bool,
+) -> Assessed:
+    """The estimate from all windows, if a term explains all that they have beyond noise: those that were left out were
+    not spoiled. `own` if none does."""
+    fit = replace(batch(rows, own.fit.p, with_error, compensate), start=own.fit.start)
+    library = Library(run, used, fit)
+    lacking = Missing.of(library, uncertainty(fit).se)
+    is_explained = lacking.is_large and chi2_of_sensors(explained(library, lacking).fit) < NOISE
+    return assessed(fit) if is_explained else own
 
 
 def _estimated(rows: WeakRows, start: Float | None, equation_error: bool, compensate: bool) -> Fit:

@@ -52,7 +52,7 @@ _CHANGES = 0.5  # the same of what changes: its course is one of few, and what t
 _EQUAL, _BY_LUCK = 0.9999, 4.0  # of the best gain: the same column; what a gain is less or more by chance
 _MOST_RIVALS = 5
 _STAND_IN = 1.5  # times the chi^2 that is left with a term: without it no more is left, as it stood in for a later one
-_NOISE, _NOTICED = 2.0, 1.5  # chi^2 that is the sensors'; from which a term that explains much is looked for
+NOISE, _NOTICED = 2.0, 1.5  # chi^2 that is the sensors'; from which a term that explains much is looked for
 # Of the residuals beyond it: a law that imitates the missing one explains half to nine tenths of them.
 _ALL, MOST = 0.95, 0.9
 _ROUNDS = 6  # of a size
@@ -64,6 +64,10 @@ _FACTORS, _STEPS = (1.25, 1.08, 1.025), 4  # of a level, as often as it gets bet
 _PART = 0.01  # of a level: a step that gives its slope
 _HALVINGS = 4  # of the distance of two jumps
 _PASSES = 3  # of whitening in a fit that begins near its end
+
+
+def _is_visible(shift: Float, se: Float, p: Float) -> npt.NDArray[np.bool_]:
+    return (shift > MOVES * se) & (shift > VISIBLE * np.abs(p))
 
 
 def _by_chance(windows: float, surest: float, normal: float) -> float:
@@ -97,12 +101,14 @@ class Missing:
     shifts : what p moves by with each plausible one [plausible, n_p]
     visible : parameters that it moves by more than their standard errors cover and by more than is tolerated [n_p]
     scores : of the estimate
+    se : its standard errors, without those shifts [n_p]
     """
 
     there: tuple[Candidate, ...]
     shifts: Float
     visible: npt.NDArray[np.bool_]
     scores: Scores
+    se: Float
 
     @classmethod
     def of(cls, library: Library, se: Float, fit: Fit | None = None) -> Missing:
@@ -113,7 +119,7 @@ class Missing:
         scores = library.scores if fit is None else Scores(fit)
         scored, p = scores.of(library.candidates), scores.fit.p
         chi2 = chi2_of_sensors(scores.fit)
-        doubtful = chi2 < _NOISE  # the residuals are no sign that anything is missing
+        doubtful = chi2 < NOISE  # the residuals are no sign that anything is missing
         # Standard errors from the scatter of few windows, which overlap, are themselves uncertain; those of the
         # sensors' noise are not, where it is what is left.
         surest = max((one.certainty for one in scored), default=0.0)
@@ -146,12 +152,17 @@ class Missing:
         shifts = np.array(
             [one.shift for one in plausible if one.own > _DISTINCT or one.share > _RIVAL * there[0].share]
         ).reshape(-1, len(p))
-        error = np.max(np.abs(shifts), axis=0, initial=0.0)
-        return cls(there, shifts, (error > MOVES * se) & (error > VISIBLE * np.abs(p)), scores)
+        visible = _is_visible(np.max(np.abs(shifts), axis=0, initial=0.0), se, p)
+        return cls(there, shifts, visible, scores, se)
 
     def also(self, shift: Float) -> Missing:
         """With one more plausible shift of p [n_p]."""
         return replace(self, shifts=np.append(self.shifts, shift[np.newaxis], axis=0))
+
+    def by_fit(self, p: Float) -> Missing:
+        """With the shift to p [n_p] of a fit that has the terms: what scored to first order may move it further."""
+        begun = self.scores.fit.p
+        return replace(self.also(p - begun), visible=self.visible | _is_visible(np.abs(p - begun), self.se, begun))
 
     @property
     def error(self) -> Float:
@@ -239,10 +250,10 @@ def explained(library: Library, found: Missing) -> Explained:
     for _ in range(_MOST_TERMS):
         before, begun = unlikelihood(fit), fit.p
         groups = found.groups()
-        tellable = [one for one in groups if one[0].own > _DISTINCT or one[0].share > _RIVAL * groups[0][0].share]
+        tellable = [one for one in groups if one[0].own > _DISTINCT or one[0].share > _PLAUSIBLE * groups[0][0].share]
         distinct = tellable[:_FAMILIES]
-        # A lag is a delay to first order alone.
-        leading = [one for group in distinct for one in group if one is group[0] or _is_lag(one)]
+        # A lag is a delay to first order alone: which of them leads is rounding.
+        leading = [one for group in distinct for one in group if one is group[0] or _is_in_time(one)]
         gains = _gains(library, fit, before, leading)
         if not gains:
             break
@@ -275,7 +286,7 @@ def explained(library: Library, found: Missing) -> Explained:
             share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
             few = len(named) < _MOST_TERMS  # three terms imitate much
             changes = any(isinstance(one.chosen.kind, Course) for one in named)  # imitates what follows the amplitude
-            complete = left < (_NOTICED if changes else _NOISE)
+            complete = left < (_NOTICED if changes else NOISE)
             complete |= few and (share > _ALL or share > MOST and not changes and not found.visible.any())
         if complete and not found.visible.any():
             break
@@ -344,8 +355,8 @@ def _rival(chosen: Candidate, one: Candidate) -> float:
     return _CHANGES if isinstance(chosen.kind, Course) and isinstance(one.kind, Course) else _RIVAL
 
 
-def _is_lag(one: Candidate) -> bool:
-    return isinstance(one.kind, Act) and one.kind.positive and one.kind.exact is not None
+def _is_in_time(one: Candidate) -> bool:
+    return isinstance(one.kind, Act) and one.kind.measure == "time"
 
 
 def _plainness(one: Candidate) -> int:

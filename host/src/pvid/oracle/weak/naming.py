@@ -150,7 +150,8 @@ def of_unexplained(model: CompiledModel, found: Uncertainty, lacking: Missing) -
         return []
     row = model.rows[int(np.argmin(found.r2))].name
     many = percent(left) if left < 1 else "more than 100 %"
-    text = f"{row[0].upper()}{row[1:]} leaves {many} of its motion unexplained, and no term that was tried "
+    leaves, its = ("leave", "their") if row.startswith("equations") else ("leaves", "its")
+    text = f"{row[0].upper()}{row[1:]} {leaves} {many} of {its} motion unexplained, and no term that was tried "
     text += "explains it: the cause is unknown. The standard errors contain how far each quarter of the run moves p."
     return [Reason("unexplained", text)]
 

@@ -28,6 +28,7 @@ _HELD = 3  # samples at the limit, at least
 _BEYOND = 10.0  # resolutions by which the motion before the limit would have gone beyond it
 _MOVES = 0.02  # of its range, by which another signal moves meanwhile
 _APPROACH, _APART = 3, 4.0  # samples before the limit, at least, and resolutions from it
+_BRAKES = 5.0  # times as far away three times as long before: 3 to 4 at a steady speed, 9 and more braked by friction
 
 _BLOCK = 50  # samples of a standstill
 _TOGGLES = 0.1  # of the samples of a block that differ from the one before
@@ -84,9 +85,9 @@ def explains(reasons: Iterable[Reason], best: Candidate, sample_rate: float) -> 
 def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) -> list[Reason]:
     """A sensor stands at its largest or smallest value, reached at speed, while something else moves.
 
-    A motion that turns there would come to it slowly. What settles there, as a current after a step of its voltage,
-    does so while every other signal stands too. An input may well be limited to that value: of one that comes to it
-    steadily this is a note.
+    A motion that turns there, or that friction brakes and holds, comes to it slowly. What settles there, as a current
+    after a step of its voltage, does so while every other signal stands too. An input may well be limited to that
+    value: of one that comes to it steadily this is a note.
     """
     x = samples[signal.name]
     reach = float(np.nanmax(x) - np.nanmin(x))
@@ -104,6 +105,8 @@ def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) 
             back = int(len(before) - 1 - far[-1]) + _APPROACH if len(far) else len(before) + _APPROACH - 1
             speed = abs(limit - x[first - back]) / back
             if signal.driven and np.any(np.diff(x[first - _APPROACH : first]) == 0):
+                continue
+            if inertial and abs(limit - x[max(first - 3 * back, 0)]) > _BRAKES * abs(limit - x[first - back]):
                 continue
             moving = inertial or any(np.ptp(y[first:end]) > _MOVES * float(np.nanmax(y) - np.nanmin(y)) for y in others)
             if moving and speed * (end - first) / 2 > _BEYOND * step:
