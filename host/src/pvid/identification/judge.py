@@ -55,7 +55,9 @@ PREDICTED = 0.9  # R^2 of motion that was not seen, below which the equations do
 _NOTHING, _NO_WORSE = 1e-6, 0.01  # of a parameter: its term is gone; by the logarithm of the rms: it is not missed
 _OF_NOISE = 3.0  # times the sensor's: a smaller error of a prediction is noise
 
+_FALLEN = 0.01  # of its guess: a parameter that the search for the others may have lost
 _USUAL = "the usual estimate"
+_WHOLE = "the fit of the whole equations"
 # Doubts of the usual estimate alone: another has its own, or is one of those that were compared.
 _OF_PARAMETERS = ("not_identified", "undetermined", "near_zero")
 _OF_USUAL = (
@@ -177,8 +179,10 @@ def _judged(answer: Analysis) -> Analysis:
         found += trial.estimates(best.name, *designs[best.name], _WEIGHTS[1:])
         best = min(found, key=attrgetter("score"))
         if not trial.is_spent and any(one.r2 > 0 for one in best.sensors):  # else no motion near the recorded one
-            name = "the fit of the whole equations" + ("" if best.name == _USUAL else f", from {best.name} on")
+            name = _WHOLE + ("" if best.name == _USUAL else f", from {best.name} on")
             found += trial.refined(best, name, _MOST)
+        if trial.has_fallen(best):  # whatever the search for others has spent
+            found += trial.refined(trial.at_guesses(best), f"{_WHOLE}, from the guesses on", _MOST)
     found = [one for one in found if np.isfinite(one.score)]
     if not found:
         return answer
@@ -343,13 +347,22 @@ class _Trial:
         if not again:
             return list(found)
         best = min(again, key=attrgetter("score"))
-        p = np.array([one.guess for one in self._answer.model.unknowns])
-        guesses = replace(best, p=p, halves=(self._motion.r_of(p),) * 2, score=np.inf)
-        for start, named in ((best, ""), (guesses, ", from the guesses on")):
+        for start, named in ((best, ""), (self.at_guesses(best), ", from the guesses on")):
             if _poor(min(again, key=attrgetter("score"))):
-                name = f"the fit of the whole equations over blocks of {self._seconds:.2g} s{named}"
-                again += self.refined(self._scored(start), name, _MOST_OF_PARTS)
+                name = f"{_WHOLE} over blocks of {self._seconds:.2g} s{named}"
+                again += self.refined(start, name, _MOST_OF_PARTS)
         return again
+
+    def at_guesses(self, one: Candidate) -> Candidate:
+        """The guesses in place of an estimate, scored."""
+        p = np.array([unknown.guess for unknown in self._answer.model.unknowns])
+        return self._scored(replace(one, p=p, halves=(self._motion.r_of(p),) * 2, score=np.inf))
+
+    def has_fallen(self, one: Candidate) -> bool:
+        """Whether a positive parameter is next to nothing: a search cannot come back from there, and a mechanism of two
+        bodies may have become one of one body."""
+        unknowns = self._answer.model.unknowns
+        return any(own.positive and p < _FALLEN * own.guess for own, p in zip(unknowns, one.p, strict=True))
 
     @property
     def _seconds(self) -> float:
