@@ -270,6 +270,9 @@ class DataSet(dict[str, npt.NDArray[Any]]):
     coords = ("t",)
     data_vars = ("F", "x")
 
+    def __missing__(self, name: str) -> npt.NDArray[Any]:
+        return {"t": T}[name]
+
 
 FRAME = pandas.DataFrame({"t": T, "F": F, "x": X})
 Row = namedtuple("Row", "t F x")
@@ -285,7 +288,7 @@ DATA: dict[str, tuple[Any, str | None]] = {
     "a unit in the name": (pandas.DataFrame({"t_ms": T * 1000, "F": F, "x [mm]": X * 1000}), "t=t_ms,x=x [mm]"),
     "records": ([{"t": t, "F": f, "x": x} for t, f, x in zip(T, F, X, strict=True)], None),
     "named tuples": ([Row(*one) for one in zip(T, F, X, strict=True)], None),
-    "a data set": (DataSet(t=T, F=F, x=X), None),
+    "a data set": (DataSet(F=F, x=X), None),
     "names in bytes": ({b"t": T, b"F": F, b"x": X}, None),
     "milliseconds since 1970": ({"t": 1_714_640_400_000 + 2 * np.arange(ROWS), "F": F, "x": X}, None),
 }
@@ -308,3 +311,73 @@ def test_data_of_other_kinds(case: str) -> None:
 def test_data_without_arrays_is_refused(data: Any, part: str) -> None:
     with pytest.raises(PvidError, match=part):
         recording_of_arrays(named(data), None, columns(None))
+
+
+# ---- what a review found
+
+
+@pytest.mark.parametrize("name", ["t [s]", "time_s", "julian_time_of_run_s"])
+def test_seconds_of_a_day_are_seconds_where_the_file_states_them(name: str, tmp_path: Path) -> None:
+    rows = [(f"{43_200 + 0.0023727 * k:.7f}", f, x) for k, (_, f, x) in enumerate(CELLS)]
+    found = read(tmp_path / "a.csv", of_rows(f"{name},F,x", rows), f"t={name}")
+    assert found.sample_rate == pytest.approx(1 / 0.0023727, rel=1e-3)
+
+
+def test_times_of_arrays_are_seconds_at_any_hour() -> None:
+    found = recording_of_arrays({"t": 43_200 + 0.00200231 * np.arange(ROWS), "F": F, "x": X}, None, columns(None))
+    assert found.sample_rate == pytest.approx(1 / 0.00200231, rel=1e-3)
+
+
+def test_the_own_name_of_a_signal_is_no_unit(tmp_path: Path) -> None:
+    own = Columns((Channel("F", "N"), Channel("elbow_rev", "rad")))
+    path = tmp_path / "a.csv"
+    path.write_text(of_rows("t,F,elbow_rev", CELLS), encoding="utf-8")
+    found = read_recording(path, None, own)
+    np.testing.assert_array_equal(found.signals["elbow_rev"], X)
+
+
+def test_the_time_of_a_long_table_keeps_its_unit(tmp_path: Path) -> None:
+    rows = [(f"{1000 * float(t):.6g}", *of) for t, f, x in CELLS for of in (("F", "N", f), ("x", "m", x))]
+    assert_same(read(tmp_path / "a.csv", of_rows("time_ms,name,unit,value", rows), "t=time_ms"))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "part"),
+    [
+        (
+            "a.json",
+            json.dumps({one: [{"t": 0.0, "F": 1.0, "x": 2.0}] * 9 for one in ("before", "after")}),
+            "holds several tables: 'before' and 'after'; keep the one to read",
+        ),
+        ("a.json", "[" * 100_000, "is nested too deeply for a recording"),
+        (
+            "a.txt",
+            "# Created by Octave\n" + "".join(f"# name: {n}\n# rows: 2\n# columns: 1\n1\n2\n" for n in "tFxx"),
+            "has several matrices 'x', of structs: save one of these alone",
+        ),
+    ],
+)
+def test_one_of_several_tables_is_not_taken(name: str, content: str, part: str, tmp_path: Path) -> None:
+    with pytest.raises(PvidError, match=part):
+        read(tmp_path / name, content)
+
+
+def test_an_archive_of_an_unknown_method_is_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a.csv", of_rows("t,F,x", CELLS))
+    content = bytearray(path.read_bytes())
+    content[8] = 9  # Deflate64, in the file's own head and in the directory
+    content[content.rindex(b"PK\x01\x02") + 10] = 9
+    path.write_bytes(content)
+    with pytest.raises(PvidError, match="is encrypted, or packed in a way that is not read: unpack it"):
+        read_recording(path, None, columns(None))
+
+
+def test_json_on_one_long_line_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    records = [{"t": float(t), "F": float(f), "x": float(x)} for t, f, x in CELLS]
+    monkeypatch.setattr("pvid.rig.text_lines.BLOCK", 1000)
+    assert_same(read(tmp_path / "a.json", json.dumps(records)))
+    monkeypatch.setattr("pvid.rig.text_lines._LONGEST", 1000)
+    with pytest.raises(PvidError, match="is longer than 0 MiB: write it as lines or as columns"):
+        read(tmp_path / "a.json", json.dumps(records))

@@ -36,10 +36,10 @@ def named(data: Any) -> dict[str, Any]:
     if isinstance(data, Sequence) and data and all(isinstance(one, Mapping) or hasattr(one, "_asdict") for one in data):
         rows = [one if isinstance(one, Mapping) else one._asdict() for one in data]
         return {name: [row.get(name) for row in rows] for name in dict.fromkeys(name for row in rows for name in row)}
-    if isinstance(data, Mapping):
-        names = [*data.keys()]
-    elif hasattr(data, "data_vars"):  # of xarray, whose coordinates are no keys
+    if hasattr(data, "data_vars"):  # of xarray, a mapping whose coordinates are no keys
         names = [*data.coords, *data.data_vars]
+    elif isinstance(data, Mapping):
+        names = [*data.keys()]
     else:
         found = getattr(data, "column_names", getattr(data, "columns", None))
         if found is None:

@@ -141,7 +141,7 @@ def table_of(
     """
     places = columns.places(path, names)
     given = {
-        signal: (units or {}).get(names[place]) or unit_in_name(names[place], columns.units[signal])
+        signal: (units or {}).get(names[place]) or unit_in_name(names[place], signal, columns.units[signal])
         for signal, place in places.items()
     }
     found = {signal: _array(path, names[place], column(names[place])) for signal, place in places.items()}

@@ -96,6 +96,7 @@ class Column:
     ----------
     name : in the file's header, or a position from 1
     unit_given : whether the scale was typed; else that of the file holds, if it has one
+    unit_of_file : whether the scale is one that the file states
     """
 
     name: str
@@ -103,6 +104,7 @@ class Column:
     divisor: float = 1.0
     offset: float = 0.0
     unit_given: bool = False
+    unit_of_file: bool = False
 
     def in_si(self, values: FloatArray) -> FloatArray:
         """Numbers of the file [n] in s, rad or m [n]; the same array where the file is in SI."""
@@ -186,7 +188,8 @@ class Columns:
             if scale is None:
                 unknown.append(f"{shown(unit)} of column {shown(column.name)}")
                 continue
-            named[signal] = replace(column, factor=scale.factor, divisor=scale.divisor, offset=scale.offset)
+            of_file = replace(column, factor=scale.factor, divisor=scale.divisor, offset=scale.offset)
+            named[signal] = replace(of_file, unit_of_file=True)
             if scale != Scale():
                 used.append(f"{signal} in {spelled(unit)}")
         notes: tuple[str, ...] = (f"units as the file states them: {listed(used)}",) if used else ()
@@ -336,10 +339,11 @@ def unit_in(name: str, si: str) -> str | None:
     return unit if scale_to(si, unit) is not None else None
 
 
-def unit_in_name(name: str, si: str) -> str:
+def unit_in_name(name: str, signal: str, si: str) -> str:
     """The unit that a column's name states beyond doubt for a signal in an SI unit: in brackets (of any dimension),
-    behind a sign, or at its end (`angle_deg`, but not `x_in`); "" where there is none."""
-    if found := unit_in_brackets(name):
+    behind a sign, or at its end (`angle_deg`, but not `x_in`, nor in the signal's own name: `elbow_rev`); "" where
+    there is none."""
+    if (found := unit_in_brackets(name)) or name == signal:
         return found
     behind = _BEHIND_SIGN.search(name)
     if behind is not None and scale_to(si, behind["unit"]) is not None:

@@ -157,7 +157,7 @@ class _TextTable:
             raise PvidError(f"{path}{where}: more names than the lines below have cells, {layout.width}.")
         units = {
             signal: (layout.units[place] if place < len(layout.units) else "")
-            or unit_in_name(layout.names[place], columns.units[signal])
+            or unit_in_name(layout.names[place], signal, columns.units[signal])
             for signal, place in self._places.items()
         }
         rows = (layout.cells(line) for line in lines[layout.body - 1 :])

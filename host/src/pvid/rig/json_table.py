@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import reason
+from pvid.base.wording import listed, reason, shown
 from pvid.rig.columns import Columns
 from pvid.rig.csv_table import read_csv, text_table
 from pvid.rig.size import refuse_beyond
 from pvid.rig.table import Table
-from pvid.rig.text_lines import blocks
+from pvid.rig.text_lines import whole
 
 _ROWS = 1 << 14  # a block
 
@@ -26,9 +26,11 @@ def read_json(path: Path, columns: Columns) -> Table:
 
     Raises PvidError for whatever is wrong with the file; lines that are no JSON are read as text.
     """
-    text = b"".join(blocks(path)).decode(errors="replace")
+    text = whole(path).decode(errors="replace")
     try:
-        records = _records(json.loads(text))
+        records = _records(path, json.loads(text))
+    except RecursionError as error:
+        raise PvidError(f"{path} is nested too deeply for a recording.") from error
     except ValueError as error:
         lines = [one for one in text.split("\n") if one.strip()]
         if len(lines) < 2:
@@ -48,19 +50,32 @@ def read_json(path: Path, columns: Columns) -> Table:
     return text_table(path, columns, partial(_blocks, names, short, rows), "record")
 
 
-def _records(found: Any) -> list[Any]:
-    """Those of a list, or of the longest list that an object holds; of lists beside each other, a record a sample."""
+def _records(path: Path, found: Any) -> list[Any]:
+    """Those of a list, or of the one that an object holds; of lists beside each other, a record a sample.
+
+    Raises PvidError for an object of several tables.
+    """
     while isinstance(found, Mapping):
         lists = {name: one for name, one in found.items() if isinstance(one, list)}
         longest = max(map(len, lists.values()), default=0)
         beside = {name: one for name, one in lists.items() if len(one) == longest > 1}
         if len(beside) > 1 and not any(isinstance(one[0], Mapping | list) for one in beside.values()):
             return [dict(zip(beside, row, strict=True)) for row in zip(*beside.values(), strict=True)]
-        inner = [*lists.values(), *(one for one in found.values() if isinstance(one, Mapping))]
+        tables = {name: one for name, one in found.items() if _is_table(one)}
+        if len(tables) > 1:
+            raise PvidError(f"{path} holds several tables: {listed(map(shown, tables))}; keep the one to read.")
+        inner = [*tables.values(), *lists.values(), *(one for one in found.values() if isinstance(one, Mapping))]
         if not inner:
             return [found]
-        found = max(inner, key=len)
+        found = inner[0] if tables else max(inner, key=len)
     return found if isinstance(found, list) else []
+
+
+def _is_table(found: Any) -> bool:
+    """Whether a value has records or lists of samples in it."""
+    if isinstance(found, Mapping):
+        return any(map(_is_table, found.values())) or sum(isinstance(one, list) for one in found.values()) > 1
+    return isinstance(found, list) and len(found) > 1 and isinstance(found[0], Mapping | list)
 
 
 def _cells(name: str, value: Any) -> Iterator[tuple[str, str]]:

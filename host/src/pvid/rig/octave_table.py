@@ -26,7 +26,7 @@ def is_octave(path: Path) -> bool:
 def read_octave(path: Path, columns: Columns) -> Table:
     """Reads the matrices of a file, a column of each named as in a .mat file.
 
-    Raises PvidError for a matrix with another number of numbers than it states, and as `table_of`.
+    Raises PvidError for a matrix with another number of numbers than it states, two of one name, and as `table_of`.
     """
     arrays: dict[str, npt.NDArray[np.float64]] = {}
     name, shape, rows = "", {"rows": 0, "columns": 0}, list[str]()
@@ -38,6 +38,8 @@ def read_octave(path: Path, columns: Columns) -> Table:
             except ValueError:
                 size = f"{shape['rows']} by {shape['columns']}"
                 raise PvidError(f"{path}: matrix {shown(name)} is not {size} numbers, as its head states.") from None
+            if name in arrays:
+                raise PvidError(f"{path} has several matrices {shown(name)}, of structs: save one of these alone.")
             arrays[name] = matrix
 
     for block in blocks(path):

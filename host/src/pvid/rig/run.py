@@ -203,7 +203,7 @@ def recording_of_arrays(
     names = [str(one) for one in named]
     arrays = dict(zip(names, named.values(), strict=True))
     table = table_of(Path(name), names, arrays.__getitem__, columns)
-    return _recording(_checked(_forward(in_seconds(table))), rate)
+    return _recording(_checked(_forward(in_seconds(table, days=False))), rate)
 
 
 def write_recording(path: str | os.PathLike[str], recording: Recording, channels: tuple[Channel, ...]) -> None:

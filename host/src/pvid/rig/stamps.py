@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.units import Scale, scale_to
+from pvid.rig.columns import unit_in
 from pvid.rig.gaps import longest_bridged
 from pvid.rig.table import Table
 
@@ -18,13 +20,14 @@ BoolArray = npt.NDArray[np.bool_]
 _COUNTERS = [2.0**bits * tick for bits in (16, 24, 32) for tick in (1e-9, 1e-6, 1e-3)]
 _COUNTS = [2.0**bits for bits in (16, 24, 32)]
 _CLOCKS = (1.0, 60.0, 3600.0, 86_400.0)  # fractions of a second, seconds of a minute, ... [s]
-# Stamps of 2001 to 2100 since 1970, in parts of a second, whose rows follow each other within so many seconds.
-_SINCE_1970, _LONGEST_STEP = (1e9, 4.1e9), 20.0
+# Stamps of 2015 to 2040 since 1970, in parts of a second, whose rows follow each other within so many seconds.
+_SINCE_1970, _LONGEST_STEP = (1.42e9, 2.21e9), 20.0
 _PARTS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 # Days of 2000 to 2050 since the beginning of 1900, -4712, 1858 and 0: of spreadsheets, of astronomers, of MATLAB.
 _DAYS = ((36_526.0, 54_790.0), (2_451_544.0, 2_469_808.0), (51_544.0, 69_808.0), (730_486.0, 748_750.0))
 _DAY_S = 86_400.0
-_FAST = 1e-4  # [s]
+_FAST = 1.2e-5  # [s]: days at 1 Hz and more
+_EVEN, _EVEN_AT_MOST = 1e-7, 2e-6  # part of a period, within which it is a round one
 _OF_DAYS = re.compile(r"\bdoy\b|day.?of.?(the.?)?year|julian|\bm?jd\b|^days?$|datenum|serial.?(date|day)", re.I)
 # A wrap leaves a step that is the usual one within this part, or both ends of the counter's range beside it.
 _USUAL_PART = 0.25
@@ -43,12 +46,18 @@ _SLOW_SAMPLES = 4  # of the slowest sensor between two segments
 _FEW_REPEATED, _RESTING = 0.01, 0.1
 
 
-def in_seconds(table: Table) -> Table:
-    """A table whose stamps are seconds, with a note where neither the file nor the user stated their unit and their
-    name or size does: days, or parts of a second since 1970."""
+def in_seconds(table: Table, days: bool = True) -> Table:
+    """A table whose stamps are seconds, with a note where neither the file, the column's name nor the user stated their
+    unit and the name or the size tells it: days, or parts of a second since 1970.
+
+    Parameters
+    ----------
+    days : they may be: not where times are seconds by contract
+    """
     column = table.columns["t"]
     t = table.t[np.isfinite(table.t)]
-    if column.unit_given or (column.factor, column.divisor) != (1.0, 1.0) or t.size < 2:
+    stated = column.unit_given or column.unit_of_file or scale_to("s", unit_in(column.name, "s") or "") == Scale()
+    if stated or (column.factor, column.divisor) != (1.0, 1.0) or t.size < 2:
         return table
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.abs(np.diff(t))
@@ -60,16 +69,16 @@ def in_seconds(table: Table) -> Table:
         low, high = _SINCE_1970
         if low <= t[0] / parts < high and step / parts <= _LONGEST_STEP:
             return _scaled(table, 1 / parts, f"{column.name} is taken as {unit} since 1970, by its size")
+    if not days:
+        return table
     if _OF_DAYS.search(column.name) and step < 1:
         return _scaled(table, _DAY_S, f"{column.name} is taken as days, by its name")
     if not period > 0 or not any(low <= t[0] < high for low, high in _DAYS):
         return table
-    error = max(1e-7, 8 * float(np.spacing(t[-1])) / (period * (t.size - 1)))
-    seconds = period * _DAY_S
+    rounding = max(8 * float(np.spacing(t[-1])), float(np.ptp(np.diff(t))))
+    error = min(max(_EVEN, rounding / (period * (t.size - 1))), _EVEN_AT_MOST)
     in_seconds_too = _is_round(period, error) or _is_round(1 / period, error)
-    multiple = max(seconds, 1 / seconds)
-    whole = period < _FAST and abs(multiple - round(multiple)) < 1e3 * error * multiple
-    if (whole or not in_seconds_too) and _is_round(seconds, 1e3 * error):
+    if period < _FAST or (not in_seconds_too and _is_round(period * _DAY_S, error)):
         return _scaled(table, _DAY_S, f"{column.name} is taken as days, by its size and its steps")
     return table
 

@@ -14,6 +14,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -23,6 +24,7 @@ from pvid.base.wording import listed, reason, shown
 BLOCK = 1 << 20  # bytes read at a time, and the longest line
 
 _PACKED = {"gzip": b"\x1f\x8b\x08", "bzip2": b"BZh", "xz": b"\xfd7zXZ\0", "zip": b"PK\x03\x04"}
+_LONGEST = 1 << 28  # bytes of a text of one line
 _SEEN = 4096  # bytes that the encoding is found from
 # Of UTF-16 text of mostly ASCII characters, every second byte is zero.
 _ZEROS = 0.4
@@ -36,12 +38,34 @@ def blocks(path: Path) -> Iterator[bytes]:
 
     Raises PvidError where the file is no text, or a compressed file that is not whole.
     """
+    with _unpacked(path) as file:
+        yield from _lines(path, file)
+
+
+def whole(path: Path) -> bytes:
+    """A text of one line, without a byte order mark.
+
+    Raises PvidError where it is longer than 256 MiB, or a compressed file that is not whole.
+    """
+    with _unpacked(path) as file:
+        content = file.read(_LONGEST + 1)
+    if len(content) > _LONGEST:
+        size = f"{_LONGEST >> 20} MiB"
+        raise PvidError(f"{path} is longer than {size}: write it as lines or as columns (.csv, .parquet).")
+    mark, encoding = _encoding(content[:_SEEN])
+    return content[mark:].decode(encoding, "replace").encode() if encoding else content[mark:]
+
+
+@contextmanager
+def _unpacked(path: Path) -> Iterator[BinaryIO]:
     try:
         with _opened(path) as file:
-            yield from _lines(path, file)
+            yield file
     except (gzip.BadGzipFile, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile) as error:
         kind = _packed(path) or "gzip"
         raise PvidError(f"{path} is not a whole {kind} file: {reason(error)}.") from error
+    except RuntimeError as error:  # zipfile's
+        raise PvidError(f"{path} is encrypted, or packed in a way that is not read: unpack it.") from error
 
 
 def _packed(path: Path) -> str:

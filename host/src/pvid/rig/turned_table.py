@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from pvid.base.units import is_unit
 from pvid.rig.cells import is_missing, is_number
-from pvid.rig.columns import TIME
+from pvid.rig.columns import TIME, unit_in_name
 from pvid.rig.layout import SEPARATORS, split
 from pvid.rig.times import TimesOfDay, is_time
 
@@ -154,7 +154,8 @@ def _numbers(stamps: Iterable[str]) -> list[float]:
 def _of_long(long: _Long, blocks_of: Callable[[], Iterator[bytes]]) -> Iterator[bytes]:
     """Rows of one stamp that are beside each other, or anywhere in a stacked table, as one."""
     place = {name: k for k, name in enumerate(long.names)}
-    head = _written([[long.above, *long.names], ["s", *long.units]][: 1 + bool(long.units)])
+    units = [[unit_in_name(long.above, "", "s") or "s", *long.units]] if long.units else []
+    head = _written([[long.above, *long.names], *units])
     rows: dict[tuple[str, int], list[str]] = {}  # by stamp, and how often it has been there
     for block in blocks_of():
         for line in _lines(block):

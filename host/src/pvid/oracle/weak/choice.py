@@ -234,7 +234,7 @@ def _contradicts(one: Scored, other: Scored) -> bool:
     a part that the equations miss may make a mechanism of fewer bodies fit some windows best."""
     if not other.near_0 or other.chi2 < MODEL_ERROR or one.near_0 or not one.known or one.chi2 > other.chi2:
         return False
-    return bool(np.any((other.p < _NONE * one.p) & (one.error < _SURE * one.p)))
+    return bool(np.any((np.abs(other.p) < _NONE * one.p) & (one.error < _SURE * one.p)))
 
 
 def _ranked(

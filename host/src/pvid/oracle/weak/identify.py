@@ -340,8 +340,11 @@ def _of_all_windows(
     fit = replace(batch(rows, own.fit.p, with_error, compensate), start=own.fit.start)
     library = Library(run, used, fit)
     lacking = Missing.of(library, uncertainty(fit).se)
-    is_explained = lacking.is_large and chi2_of_sensors(explained(library, lacking).fit) < NOISE
-    return assessed(fit) if is_explained else own
+    if not lacking.is_large:
+        return own
+    named = explained(library, lacking)
+    is_named = named.complete and (lacking.visible.any() or named.share >= MOST)
+    return assessed(fit) if is_named and chi2_of_sensors(named.fit) < NOISE else own
 
 
 def _estimated(rows: WeakRows, start: Float | None, equation_error: bool, compensate: bool) -> Fit:
