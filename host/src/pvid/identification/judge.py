@@ -57,7 +57,7 @@ _OF_NOISE = 3.0  # times the sensor's: a smaller error of a prediction is noise
 
 _FALLEN = 0.01  # of its guess: a parameter that the search for the others may have lost
 _USUAL = "the usual estimate"
-_WHOLE = "the fit of the whole equations"
+_WHOLE, _FROM_GUESSES = "the fit of the whole equations", ", from the guesses on"
 # Doubts of the usual estimate alone: another has its own, or is one of those that were compared.
 _OF_PARAMETERS = ("not_identified", "undetermined", "near_zero")
 _OF_USUAL = (
@@ -182,7 +182,7 @@ def _judged(answer: Analysis) -> Analysis:
             name = _WHOLE + ("" if best.name == _USUAL else f", from {best.name} on")
             found += trial.refined(best, name, _MOST)
         if trial.has_fallen(best):  # whatever the search for others has spent
-            found += trial.refined(trial.at_guesses(best), f"{_WHOLE}, from the guesses on", _MOST)
+            found += trial.refined(trial.at_guesses(best), _WHOLE + _FROM_GUESSES, _MOST)
     found = [one for one in found if np.isfinite(one.score)]
     if not found:
         return answer
@@ -347,10 +347,11 @@ class _Trial:
         if not again:
             return list(found)
         best = min(again, key=attrgetter("score"))
-        for start, named in ((best, ""), (self.at_guesses(best), ", from the guesses on")):
-            if _poor(min(again, key=attrgetter("score"))):
-                name = f"{_WHOLE} over blocks of {self._seconds:.2g} s{named}"
-                again += self.refined(start, name, _MOST_OF_PARTS)
+        name = f"{_WHOLE} over blocks of {self._seconds:.2g} s"
+        if _poor(best):
+            again += self.refined(best, name, _MOST_OF_PARTS)
+        if _poor(min(again, key=attrgetter("score"))):
+            again += self.refined(self.at_guesses(best), name + _FROM_GUESSES, _MOST_OF_PARTS)
         return again
 
     def at_guesses(self, one: Candidate) -> Candidate:

@@ -1,4 +1,5 @@
-"""Time stamps that do not rise: counters that wrap, rows out of order, wild stamps, clocks that start over."""
+"""Time stamps that are no seconds, or do not rise: counters that wrap, rows out of order, wild stamps, clocks that
+start over."""
 
 from __future__ import annotations
 
@@ -122,9 +123,7 @@ def _unwrapped(table: Table, usual: float) -> Table:
                 return table  # segments of that length, or a clock that began with the run
             name = table.columns["t"].name
             note = f"{name} starts over after {period:.10g} s, {over.size} times: joined (a part of a clock's time)"
-            return replace(
-                table, t=t + period * np.concatenate([[0], np.cumsum(steps < 0)]), notes=(*table.notes, note)
-            )
+            return _joined(table, period, steps < 0, note)
     for period in sorted({*_COUNTERS, *(unit * counts for counts in _COUNTS)}):
         back = np.flatnonzero(steps < -period / 2)
         if not back.size or period < _LEAST_TICKS * usual:
@@ -136,14 +135,19 @@ def _unwrapped(table: Table, usual: float) -> Table:
             ends = (t[back] > low + period - _AT_ENDS * usual) & (t[back + 1] < low + _AT_ENDS * usual)
             fits |= near & ends & (t[back] < low + period) & (t[back + 1] >= low)
         if fits.all():
-            t = t + period * np.concatenate([[0], np.cumsum(steps < -period / 2)])
             times = "once" if back.size == 1 else f"{back.size} times"
             note = (
                 f"{table.columns['t'].name} starts over after {period:.10g} s, {times} (first: "
                 f"{table.place(int(back[0]) + 1)}): joined (a counter of the board)"
             )
-            return replace(table, t=t, notes=(*table.notes, note))
+            return _joined(table, period, steps < -period / 2, note)
     return table
+
+
+def _joined(table: Table, period: float, wraps: BoolArray, note: str) -> Table:
+    """With a period more behind each wrap [n - 1]."""
+    turns = np.concatenate([[0], np.cumsum(wraps)])
+    return replace(table, t=table.t + period * turns, notes=(*table.notes, note))
 
 
 def _sorted(table: Table, usual: float) -> Table:
@@ -157,13 +161,13 @@ def _sorted(table: Table, usual: float) -> Table:
     rising = np.diff(table.t[order])
     if back > _SHUFFLED * rising.size and np.ptp(rising) < _REGULAR_PART * rising.mean():
         note = f"the rows are not in the order of {table.columns['t'].name}: sorted by it"
-        return replace(table.rows(order, lambda row: table.place(int(order[row])), note), t=table.t[order])
-    if np.abs(order[moved] - moved).max() > _FARTHEST or moved.size > order.size * _FARTHEST * _WILD_SHARE:
-        return table
-    beside = np.unique(np.clip(np.concatenate([moved, moved - 1]), 0, order.size - 2))
-    if np.abs(np.diff(table.t[order])[beside] / usual - 1).max() > _REGULAR_PART:
-        return table
-    note = f"rows out of order: {back} (first: {table.place(int(moved[0]))}), sorted by {table.columns['t'].name}"
+    else:
+        if np.abs(order[moved] - moved).max() > _FARTHEST or moved.size > order.size * _FARTHEST * _WILD_SHARE:
+            return table
+        beside = np.unique(np.clip(np.concatenate([moved, moved - 1]), 0, order.size - 2))
+        if np.abs(rising[beside] / usual - 1).max() > _REGULAR_PART:
+            return table
+        note = f"rows out of order: {back} (first: {table.place(int(moved[0]))}), sorted by {table.columns['t'].name}"
     return replace(table.rows(order, lambda row: table.place(int(order[row])), note), t=table.t[order])
 
 

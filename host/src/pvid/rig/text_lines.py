@@ -91,7 +91,8 @@ def _opened(path: Path) -> BinaryIO:
         return path.open("rb")
     archive = zipfile.ZipFile(path)
     names = [one for one in archive.namelist() if not one.endswith("/")]
-    outer = [one for one in names if one.count("/") == min(name.count("/") for name in names)]
+    depth = min((one.count("/") for one in names), default=0)
+    outer = [one for one in names if one.count("/") == depth]
     if len(outer) != 1:
         count = f"{len(outer)} files: {listed(map(shown, outer[:4]))}" if outer else "no file"
         raise PvidError(f"{path} holds {count}; unpack it and name the recording.")

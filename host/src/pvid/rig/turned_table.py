@@ -16,7 +16,7 @@ from pvid.rig.columns import TIME, unit_in_name
 from pvid.rig.layout import SEPARATORS, split
 from pvid.rig.times import TimesOfDay, is_time
 
-_SAMPLED, _SEEN = 2000, 20_000  # lines that show how a table is turned, whose time stands in a column or in a row
+_SAMPLED, _SEEN = 2000, 20_000  # lines by which a table is recognised that has its time in a column, or in a row
 _MOST_SIGNALS = 64
 _FEWEST = 3  # times of each signal
 _VALUE = re.compile("value|wert|valeur|valor|reading|state", re.I)
