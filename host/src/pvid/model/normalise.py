@@ -6,6 +6,7 @@ one of them.
 
 from __future__ import annotations
 
+import random
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -13,22 +14,34 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Part, Row, Unknown
 from pvid.model.factor import divided
-from pvid.model.gradient import jacobian_at, rank
+from pvid.model.gradient import rank
 from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import order_of
+from pvid.model.zero import RationalPoint
 
 
 def with_scales(rows: Sequence[Row], unknowns: Sequence[Unknown]) -> list[Row]:
     """Rows of which each has a scale, in the same order."""
     p = [one.symbol for one in unknowns]
+    point = RationalPoint(random.Random(1))
+
+    def gradients(row: Row) -> sp.Matrix:
+        """d theta / d p [theta, p] at the one point."""
+        return sp.Matrix(len(row.theta), len(p), lambda i, j: point.of(sp.diff(row.theta[i], p[j])))
+
     out: dict[int, Row] = {k: row for k, row in enumerate(rows) if row.known}
+    at = {k: gradients(row) for k, row in enumerate(rows)}
     waiting = [k for k, row in enumerate(rows) if not row.known]
     while waiting:
-        fixed = [theta for row in out.values() for theta in row.theta]
-        kept = next((k for k in waiting if any(_follows(theta, fixed, p) for theta in rows[k].theta)), None)
+        fixed = sp.Matrix.vstack(sp.zeros(0, len(p)), *(at[k] for k in out))
+        kept = next((k for k in waiting if _follows(at[k], fixed)), None)
         k = waiting[0] if kept is None else kept
-        out[k] = rows[k] if kept is not None else divided(rows[k], _normaliser(rows[k], unknowns), p)
+        if kept is None:
+            out[k] = divided(rows[k], _normaliser(rows[k], unknowns), p)
+            at[k] = gradients(out[k])
+        else:
+            out[k] = rows[k]
         waiting.remove(k)
     return [out[k] for k in range(len(rows))]
 
@@ -49,12 +62,10 @@ def with_own_scales(model: CompiledModel) -> CompiledModel | None:
     return replace(model, rows=tuple(rows)) if rows != list(model.rows) else None
 
 
-def _follows(theta: sp.Expr, fixed: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -> bool:
-    """Whether it is, near any point, a function of the fixed ones."""
-    if not fixed:
-        return False
-    both, _ = jacobian_at([*fixed, theta], p)
-    return rank(both[:-1, :]) == rank(both)
+def _follows(gradients: sp.Matrix, fixed: sp.Matrix) -> bool:
+    """Whether one of these theta is, near any point, a function of the fixed ones."""
+    known = rank(fixed)
+    return known > 0 and any(rank(fixed.col_join(one)) == known for one in map(gradients.row, range(gradients.rows)))
 
 
 def _derivatives(part: Part) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -41,19 +41,15 @@ class Symmetry:
 
 def symmetries(theta: Sequence[sp.Expr], unknowns: Sequence[Unknown]) -> list[Symmetry]:
     """Exchanges of unknowns of one unit, and changes of sign, that leave every theta as it is; the smallest of each."""
-    at = _point(theta, unknowns)
-    if at is None:
+    unchanged = _at_a_point(theta, unknowns)
+    if unchanged is None:
         return []
     out: list[Symmetry] = []
-    n = len(unknowns)
     for pairs in itertools.islice(matchings(_like(unknowns)), _MOST):
         named = tuple((unknowns[i].name, unknowns[j].name) for i, j in pairs)
         if any(set(one.swapped) <= set(named) for one in out):
             continue
-        order = list(range(n))
-        for i, j in pairs:
-            order[i], order[j] = j, i
-        if at(order, [1] * n) == at(list(range(n)), [1] * n):
+        if unchanged({i: (j, 1) for pair in pairs for i, j in (pair, pair[::-1])}):
             out.append(Symmetry(named, (), any(_apart(unknowns[i], unknowns[j]) for i, j in pairs)))
     free = [k for k, one in enumerate(unknowns) if not one.positive]
     chosen_sets = (chosen for count in range(1, len(free) + 1) for chosen in itertools.combinations(free, count))
@@ -61,17 +57,17 @@ def symmetries(theta: Sequence[sp.Expr], unknowns: Sequence[Unknown]) -> list[Sy
         names = tuple(unknowns[k].name for k in chosen)
         if any(one.negated and set(one.negated) <= set(names) for one in out):
             continue
-        if at(list(range(n)), [-1 if k in chosen else 1 for k in range(n)]) == at(list(range(n)), [1] * n):
+        if unchanged({k: (k, -1) for k in chosen}):
             ranges = [unknowns[k] for k in chosen]
             out.append(Symmetry((), names, any(one.low >= 0 or one.high <= 0 for one in ranges)))
     return out
 
 
-def _point(
+def _at_a_point(
     theta: Sequence[sp.Expr], unknowns: Sequence[Unknown]
-) -> Callable[[list[int], list[int]], list[Fraction]] | None:
-    """theta at a random rational point whose coordinates may be exchanged and negated; None where theta has sines of
-    more than one unknown, which are not judged."""
+) -> Callable[[Mapping[int, tuple[int, int]]], bool] | None:
+    """Whether every theta keeps its value at a random rational point whose coordinates are moved: {index: (index of the
+    one in its place, sign)}; None where theta has sines of more than one unknown, which are not judged."""
     p = [one.symbol for one in unknowns]
     sines = sorted({one for value in theta for one in value.atoms(sp.sin, sp.cos)}, key=str)
     if any(one.args[0] not in p for one in sines):
@@ -79,20 +75,29 @@ def _point(
     marks = {one: sp.Dummy() for one in sines}
     bare = [value.xreplace(marks) for value in theta]
     constants = sorted({one for value in bare for one in value.free_symbols} - set(p) - set(marks.values()), key=str)
-    function = function_of_fractions([*p, *marks.values(), *constants], bare)
     source = random.Random(5)
     numbers, slopes, rest = ([_fraction(source) for _ in range(k)] for k in (len(p), len(p), len(constants)))
 
-    def at(order: list[int], signs: list[int]) -> list[Fraction]:
-        values = [sign * numbers[k] for k, sign in zip(order, signs, strict=True)]
-        turned = [sign * slopes[k] for k, sign in zip(order, signs, strict=True)]
+    def place(moved: Mapping[int, tuple[int, int]]) -> list[Fraction]:
+        at = [moved.get(k, (k, 1)) for k in range(len(p))]
         of_sines = []
         for one in sines:
-            r = turned[p.index(one.args[0])]
+            k, sign = at[p.index(one.args[0])]
+            r = sign * slopes[k]
             of_sines.append(2 * r / (1 + r**2) if isinstance(one, sp.sin) else (1 - r**2) / (1 + r**2))
-        return [Fraction(one) for one in function(*values, *of_sines, *rest)]
+        return [*(sign * numbers[k] for k, sign in at), *of_sines, *rest]
 
-    return at
+    arguments = [*p, *marks.values(), *constants]
+    functions = [function_of_fractions(arguments, [value]) for value in bare]
+    here = [function(*place({})) for function in functions]
+    within = [{k for k, one in enumerate(p) if one in value.free_symbols} for value in theta]
+
+    def unchanged(moved: Mapping[int, tuple[int, int]]) -> bool:
+        values = place(moved)
+        touched = (k for k, own in enumerate(within) if not own.isdisjoint(moved))
+        return all(functions[k](*values) == here[k] for k in touched)
+
+    return unchanged
 
 
 def _fraction(source: random.Random) -> Fraction:
