@@ -18,6 +18,7 @@ import numpy as np
 from lying_board import estimate_of
 from pendulum_plant import simulate, standard_sensors
 from pendulum_run import Run
+from processes import until
 
 from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board import MechanismBoard
@@ -215,9 +216,7 @@ class Board:
         given = place, sent_by(Field(ticks, seed, estimate_every)), per_second
         self._process = get_context("fork").Process(target=_serve, args=given, daemon=True)
         self._process.start()
-        limit = time.monotonic() + 60
-        while not place.exists() and time.monotonic() < limit:
-            time.sleep(0.02)
+        until(place.exists)
 
     def kill(self) -> None:
         """The board is gone, with its line."""

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from pvid.log.file import LogWriter
+from pvid.log.reader import LogStream
 
 
 def log_of(
@@ -17,3 +18,11 @@ def log_of(
             writer.end(why or "the end")
     writer.close()
     return path
+
+
+def samples_in(path: Path) -> int:
+    """That a log holds, which may not be there yet or may grow."""
+    stream = LogStream()
+    if path.exists():
+        list(stream.feed(path.read_bytes()))
+    return stream.account.samples

@@ -1,7 +1,22 @@
-"""The processes of this machine."""
+"""The processes of this machine, and waiting for them."""
 
 import signal
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
+
+PATIENCE_S = 300.0  # of a test that waits for what a busy machine does late
+_T = TypeVar("_T")
+
+
+def until(done: Callable[[], _T]) -> _T:
+    """Waits until this is true of something, and returns it."""
+    limit = time.monotonic() + PATIENCE_S
+    while not (found := done()):
+        assert time.monotonic() < limit, "it never came so far"
+        time.sleep(0.05)
+    return found
 
 
 def children_of(pid: int) -> list[int]:

@@ -4,33 +4,16 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from processes import children_of
+from logs import samples_in
+from processes import PATIENCE_S, children_of, until
 
 from pvid.board.target import HOST_TARGET
-from pvid.log.reader import LogReader, LogStream
+from pvid.log.reader import LogReader
 from pvid.rig.mechanism_file import MechanismRig
-
-PATIENCE_S = 120
-
-
-def until(done: Callable[[], bool]) -> None:
-    limit = time.monotonic() + PATIENCE_S
-    while not done():
-        assert time.monotonic() < limit, "it never came so far"
-        time.sleep(0.05)
-
-
-def samples_in(path: Path) -> int:
-    """That the log holds."""
-    stream = LogStream()
-    if path.exists():
-        list(stream.feed(path.read_bytes()))
-    return stream.account.samples
 
 
 def runs(pid: int) -> bool:

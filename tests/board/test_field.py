@@ -10,6 +10,7 @@ import field_board
 import numpy as np
 import numpy.typing as npt
 import pytest
+from processes import PATIENCE_S
 from test_stream import KINDS, SHORT
 
 from pvid.base.errors import PvidError
@@ -116,7 +117,7 @@ def test_in_time_a_sample_takes_its_time(host_target: Target, native: Native) ->
     collect(host_target, 100, begin=rig, source=Source.SENSOR)
     began = time.monotonic()
     record = collect(host_target, 2000)
-    assert 1.5 < time.monotonic() - began < 6.0  # 2000 samples at 1 kHz; a busy machine may be late, never early
+    assert 1.5 < time.monotonic() - began < PATIENCE_S  # 2000 samples at 1 kHz; late on a busy machine, never early
     assert record.gaps == []
 
 

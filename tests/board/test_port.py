@@ -6,12 +6,12 @@ import re
 import select
 import socket
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from processes import PATIENCE_S, until
 from test_stream import TICKS, expected, play_standard, standard_rig
 
 from pvid.base.errors import PvidError
@@ -53,7 +53,7 @@ def test_a_run_goes_through_a_device_by_its_name(start: Start, tmp_path: Path, n
     assert process.stdout is not None
     output = b""
     while (found := re.search(rb"(/dev/\S+)\s", output)) is None:
-        assert select.select([process.stdout], [], [], 20)[0]
+        assert select.select([process.stdout], [], [], PATIENCE_S)[0]
         output += process.stdout.read(200)
     name = tmp_path / "ttyACM0"  # as udev names a board
     name.symlink_to(found.group(1).decode())
@@ -66,14 +66,15 @@ def test_a_run_goes_through_a_socket(start: Start, native: Native) -> None:
         number = free.getsockname()[1]
     start(f"tcp:127.0.0.1:{number},server=on,wait=off")
     url = f"socket://127.0.0.1:{number}"
-    limit = time.monotonic() + 20
-    while True:
+
+    def opens() -> bool:
         try:
             open_port(url).close()
-            break
         except PvidError:
-            assert time.monotonic() < limit
-            time.sleep(0.1)
+            return False
+        return True
+
+    until(opens)
     assert_equal_through(url, native)
 
 

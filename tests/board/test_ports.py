@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
+from processes import PATIENCE_S
 
 from pvid.board.boards import BOARDS, BUILD, Board, Outcome, build, run
 from pvid.core.sources import SRC
 
-TIMEOUT_S = 60.0
 FAULT = 112
 # A port needs nothing of the core. The build of all of it, without an FPU, shows that firmware/cmake/no_float.cmake
 # finds no floating point in the fixed-point core.
@@ -54,7 +54,7 @@ def image(board: Board) -> Path:
 
 
 def ask(board: Board, letters: bytes) -> Outcome:
-    return run(board, image(board), TIMEOUT_S, input_bytes=letters)
+    return run(board, image(board), PATIENCE_S, input_bytes=letters)
 
 
 def numbers(outcome: Outcome) -> dict[str, int]:

@@ -1,13 +1,12 @@
 """Both stages with the generated C of a mechanism on an emulated board: the hash of the core on this computer."""
 
 import pytest
+from processes import PATIENCE_S
 
 from pvid.board.boards import BOARDS
 from pvid.board.refined_image import RefinedRun, build_refined_image, published_run, refined_run
 from pvid.board.replay_image import play
 from pvid.settings.enums import Reason
-
-TIMEOUT_S = 60.0
 
 
 @pytest.mark.parametrize(
@@ -30,7 +29,7 @@ def test_a_board_refines_the_pendulum_with_dry_friction_and_slant() -> None:
 def _plays(run: RefinedRun, board: str) -> None:
     expected = run.native().run_both(run.weak.samples)
     image, _ = build_refined_image(BOARDS[board], run)
-    report = play(BOARDS[board], image, TIMEOUT_S)
+    report = play(BOARDS[board], image, PATIENCE_S)
     assert report.hash == int(expected.hash[-1])
     assert {at: int(expected.hash[at - 1]) for at in report.hashes} == report.hashes
     assert Reason.UPDATED in expected.told

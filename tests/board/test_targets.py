@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from conftest import ROOT
+from processes import PATIENCE_S
 
 from bench.figures import results_of
 from pvid.base.errors import PvidError
@@ -18,7 +19,6 @@ from pvid.board.strong_image import hashes_of, standard_run
 from pvid.board.weak_image import weak_image
 
 FORMS_AND_CORES = [*sizes.ALL, (sizes.REFINED, "f32"), (sizes.IN_BLOCKS, "f32"), (sizes.IN_BLOCKS, "q31")]
-TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
 
 Measured = dict[sizes.Configuration, tuple[sizes.Footprint, ReplayReport]]
 
@@ -100,7 +100,7 @@ def test_the_weak_form_restarts_its_windows_alike_where_samples_are_missing() ->
     replay = replace(replay, counts=counts)
     assert np.isnan(replay.samples).any()
     image, _ = mechanism_image.build_mechanism_image(BOARDS["mps2-an386"], replay)
-    assert_same_hashes(play(BOARDS["mps2-an386"], image, TIMEOUT_S), mechanism_image.native_hashes(replay))
+    assert_same_hashes(play(BOARDS["mps2-an386"], image, PATIENCE_S), mechanism_image.native_hashes(replay))
 
 
 def mean_of(measured: Measured, board: str, form: str, core: str) -> int:
@@ -162,7 +162,7 @@ def test_a_figure_over_its_budget_is_named(tmp_path: Path) -> None:
 
 def test_an_image_for_an_fpu_reports_the_fault_on_a_core_without_one() -> None:
     board = BOARDS["mps2-an386"]
-    outcome = run(board, weak_image(board, "kapitza", "f32").image, TIMEOUT_S, machine="mps2-an385")
+    outcome = run(board, weak_image(board, "kapitza", "f32").image, PATIENCE_S, machine="mps2-an385")
     assert outcome.exit_code == 112
     with pytest.raises(PvidError, match="FPU instruction and no FPU, exception 0x00000003 pc 0x"):
         parse_report(outcome.text)

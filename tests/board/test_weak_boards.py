@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import PATIENCE_S
 from program import pvid
 from records import MECHANISM, Writer, load
 
@@ -23,7 +24,6 @@ from pvid.core.native import Publisher
 from pvid.settings.enums import Core, RecordStatus
 from pvid.twin.fnv import fold_bytes
 
-TIMEOUT_S = 300.0
 TICKS = 2500
 
 
@@ -52,7 +52,7 @@ def test_a_board_computes_the_bits_of_the_core_here(board: str, name: str, core:
         fixed = mechanism_image_q31.fixed_run(name)
         expected = mechanism_image_q31.native_hashes(fixed)
         image, _ = mechanism_image_q31.build_fixed_image(BOARDS[board], fixed)
-    report = play(BOARDS[board], image, TIMEOUT_S)
+    report = play(BOARDS[board], image, PATIENCE_S)
     assert report.ticks == len(expected)
     assert {at: int(expected[at - 1]) for at in report.hashes} == report.hashes
     assert len(report.hashes) == len(expected) // REPORT_EVERY
@@ -124,7 +124,7 @@ def test_a_record_and_the_life_after_it_have_the_bits_of_this_computer(board: st
     assert 0 < second < ticks - 2 * 320
     files["replay_run.h"] = files["replay_run.h"].rstrip().removesuffix("#endif") + life
     image, _ = mechanism_image.build_with(BOARDS[board], f"dc_motor-record-{core}", files, sizes, core)
-    assert play(BOARDS[board], image, TIMEOUT_S).hash == expected
+    assert play(BOARDS[board], image, PATIENCE_S).hash == expected
 
 
 def test_an_avr_is_refused_in_words() -> None:

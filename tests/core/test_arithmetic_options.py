@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from processes import PATIENCE_S
 
 from pvid.board import mechanism_image
 from pvid.board.boards import BOARDS
@@ -17,7 +18,6 @@ ASK = """#include "pvid/arithmetic.h"
 int main(void) { return (int)pvid_arithmetic_faults_f32(); }
 """
 REORDERED = ("-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math")
-TIMEOUT_S = 120.0
 
 
 def faults(folder: Path, compiler: str, *options: str) -> int:
@@ -86,4 +86,4 @@ def test_a_cortex_m4f_image_at_gccs_default_standard_has_the_same_bits(
     image, _ = build_mechanism_image(BOARDS["mps2-an386"], run)
     given = (tmp_path / "given").read_text(encoding="utf-8")
     assert "weak/weak_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given
-    assert play(BOARDS["mps2-an386"], image, TIMEOUT_S).hash == int(native_hashes(run)[-1])
+    assert play(BOARDS["mps2-an386"], image, PATIENCE_S).hash == int(native_hashes(run)[-1])

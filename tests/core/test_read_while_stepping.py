@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from processes import PATIENCE_S
 
 from pvid.board.boards import BOARDS, BUILD, build, run
 from pvid.core.sources import INCLUDES, core_sources, left_out, source
 
 PROGRAM = ROOT / "tests" / "threads" / "read_while_stepping.c"
 ROOMS = ("number", "solve", "judge", "weak")
-TIMEOUT_S = 40.0
 
 
 def play_threads(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
@@ -32,7 +32,7 @@ def play_threads(folder: Path, *options: str) -> subprocess.CompletedProcess[str
     ]
     built = subprocess.run(command, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
-    return subprocess.run([str(folder / "read")], capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
+    return subprocess.run([str(folder / "read")], capture_output=True, text=True, check=False, timeout=PATIENCE_S)
 
 
 def test_threads_read_whole_estimates_without_a_data_race(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def counted(name: str) -> dict[str, int]:
     tree = BUILD / f"{name}-reads"
     options = {"PORT_CHECK_TABLES": "", "PORT_CHECK_READS": "ON", "PVID_LEAVE_OUT": left_out("weak", "f32")}
     build(board, tree, options, source=ROOT / "tests" / "ports")
-    outcome = run(board, tree / "read_check.elf", TIMEOUT_S)
+    outcome = run(board, tree / "read_check.elf", PATIENCE_S)
     assert outcome.exit_code == 0, outcome.text
     return {key: int(value) for key, value in re.findall(r"^(\w+) (\d+)$", outcome.text, re.MULTILINE)}
 

@@ -6,7 +6,6 @@ import socket
 import struct
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import field_board
 import numpy as np
 import pytest
+from processes import PATIENCE_S, until
 from program import PVID
 from websocket import WebSocket, create_connection
 
@@ -37,7 +37,9 @@ class Client:
     """Subscribes to every topic; `topics` has what the server advertises."""
 
     def __init__(self, port: int) -> None:
-        self.socket: WebSocket = create_connection(f"ws://127.0.0.1:{port}", subprotocols=[SUBPROTOCOL], timeout=20)
+        self.socket: WebSocket = create_connection(
+            f"ws://127.0.0.1:{port}", subprotocols=[SUBPROTOCOL], timeout=PATIENCE_S
+        )
         self.info = self.text("serverInfo")
         self.topics: dict[str, dict[str, Any]] = {}
         self.refused: list[int] = []  # channels: the SDK advertises one before it can be subscribed to
@@ -177,14 +179,17 @@ def test_the_topics_follow_a_board_that_names_its_mechanism(port: int) -> None:
 
 def client_of(process: subprocess.Popen[str], port: int) -> Client:
     """Of the server that a process is about to start."""
-    limit = time.monotonic() + 60
-    while True:
+
+    def connected() -> Client | None:
         try:
             return Client(port)
         except ConnectionRefusedError:
             assert process.poll() is None, process.communicate()
-            assert time.monotonic() < limit
-            time.sleep(0.1)
+            return None
+
+    found = until(connected)
+    assert found is not None
+    return found
 
 
 def test_the_command_serves_what_it_records(port: int, sent: list[tuple[int, link.Message]], tmp_path: Path) -> None:
@@ -204,7 +209,7 @@ def test_the_command_serves_what_it_records(port: int, sent: list[tuple[int, lin
                 line.write(frame)
             got = list(client.messages())
             process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=60)
+            out, err = process.communicate(timeout=PATIENCE_S)
         finally:
             process.kill()
     early = "attempted to subscribe to unknown channel"  # see Client.refused

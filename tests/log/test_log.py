@@ -25,6 +25,7 @@ import pytest
 import serial
 from click.testing import CliRunner
 from logs import log_of
+from processes import PATIENCE_S, until
 from shaky import field_log, throughput
 
 from pvid.base import file_lock
@@ -299,20 +300,21 @@ def pvid(tmp_path: Path) -> Iterator[Loggers]:
         one.communicate()
 
 
-def wait_for(path: Path, condition: Callable[[Account], bool]) -> Account:
+def wait_for(path: Path, condition: Callable[[Account], bool]) -> None:
     """Until the account of a log that grows is so."""
-    limit, stream, fed = time.monotonic() + 60, LogStream(), 0
-    while time.monotonic() < limit:
+    stream, fed = LogStream(), 0
+
+    def grown() -> bool:
+        nonlocal fed
         if path.exists():
             with path.open("rb") as file:
                 file.seek(fed)
                 more = file.read()
             fed += len(more)
             list(stream.feed(more))
-            if condition(stream.account):
-                return stream.account
-        time.sleep(0.05)
-    raise AssertionError("the log never came so far")
+        return condition(stream.account)
+
+    until(grown)
 
 
 def test_log_records_all_and_ends_with_a_summary(tmp_path: Path, boards: Boards, pvid: Loggers) -> None:
@@ -322,9 +324,9 @@ def test_log_records_all_and_ends_with_a_summary(tmp_path: Path, boards: Boards,
     process = pvid("--live", f"udp://127.0.0.1:{listener.getsockname()[1]}")
     wait_for(tmp_path / "out.pvlog", lambda account: account.samples == TICKS)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, err
-    listener.settimeout(5)
+    listener.settimeout(PATIENCE_S)
     assert set(json.loads(listener.recv(4096))) == {"timestamp", "tick", "samples"}
     listener.close()
     assert f"{TICKS} samples in 1 segment; lost 0 frames, 0 samples, 0 while the link was down; 0 damaged" in out
@@ -349,7 +351,7 @@ def test_a_killed_logger_leaves_a_file_that_opens_and_is_appended_to(
     again = pvid("--append")
     wait_for(tmp_path / "out.pvlog", lambda account: len(account.segments) == 2 and account.samples > before + TICKS)
     again.send_signal(signal.SIGTERM)
-    out, err = again.communicate(timeout=20)
+    out, err = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 0, err
     assert "ended by SIGTERM" in out
     _, account = read(tmp_path / "out.pvlog")
@@ -366,7 +368,7 @@ def test_a_link_that_breaks_is_taken_up_in_a_new_segment(tmp_path: Path, boards:
     boards(ticks=2 * TICKS, seed=2)
     wait_for(tmp_path / "out.pvlog", lambda account: account.samples == 3 * TICKS)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, err
     _, account = read(tmp_path / "out.pvlog")
     assert [one.samples for one in account.segments] == [TICKS, 2 * TICKS]
@@ -376,31 +378,32 @@ def test_a_link_that_breaks_is_taken_up_in_a_new_segment(tmp_path: Path, boards:
 
 def test_a_port_that_is_not_there_and_a_log_that_is(tmp_path: Path, pvid: Loggers) -> None:
     process = pvid()
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     lists = "`pvid ports` lists the ports and the emulated boards"
     assert err.splitlines()[-1] == f"pvid: there is no port board: is the board plugged in? {lists}"
     assert not (tmp_path / "out.pvlog").exists()
     (tmp_path / "out.pvlog").write_bytes(b"")
     again = pvid()
-    assert "exists; --append adds to it" in again.communicate(timeout=30)[1]
+    assert "exists; --append adds to it" in again.communicate(timeout=PATIENCE_S)[1]
     assert again.returncode == 2
 
 
 def test_too_much_loss_is_exit_code_1(tmp_path: Path, pvid: Loggers) -> None:
     frames = list(field_board.cheap_frames(20))
+    samples = str(19 * field_board.SAMPLES_A_FRAME)
     line = field_board.PtyLine(tmp_path / "board")
-    process = pvid("--duration", "1")
+    process = pvid("--samples", samples)
     line.await_word()
     line.write(b"".join(frames[:9] + frames[10:]))
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert "5 % lost, allowed are 0.1 %" in err
     (tmp_path / "out.pvlog").unlink()
-    lenient = pvid("--duration", "1", "--allow-loss", "0.05")
+    lenient = pvid("--samples", samples, "--allow-loss", "0.05")
     line.await_word()
     line.write(b"".join(frames[:9] + frames[10:]))
-    assert lenient.wait(timeout=30) == 0
+    assert lenient.wait(timeout=PATIENCE_S) == 0
 
 
 class Plugged:
@@ -536,7 +539,7 @@ def test_refusal_of_the_board_is_reported(tmp_path: Path) -> None:
         target.port.close()
         field_board.rig(0.31).write(tmp_path / "rig.toml")
         command = [sys.executable, "-m", "pvid", "log", "board", "out.pvlog", "--rig", "rig.toml", "--duration", "20"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
     finally:
         target.process.kill()
         target.process.wait()
@@ -683,7 +686,7 @@ def test_unwritable_folder_is_reported(tmp_path: Path, boards: Boards) -> None:
     (tmp_path / "folder").mkdir()
     for out, why in (("nowhere/a.pvlog", "No such file or directory"), ("board/a.pvlog", "Not a directory")):
         command = [sys.executable, "-m", "pvid", "log", "board", out]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
         assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"pvid: cannot write {out}: {why}")
 
 

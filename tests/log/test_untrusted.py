@@ -27,6 +27,7 @@ from click.testing import CliRunner
 from lies import Behaviour
 from logs import log_of
 from lying_board import TICKS, Flood, LyingBoard, Pause, Step, message
+from processes import PATIENCE_S, until
 from rehearsal import RehearsedSource
 
 from pvid.base.errors import PvidError
@@ -480,17 +481,21 @@ def test_verify_names_a_hundred_stretches_and_counts_the_others(tmp_path: Path) 
 
 def get(address: str, host: str | None = None) -> tuple[bytes, dict[str, str]]:
     request = urllib.request.Request(address, headers={} if host is None else {"Host": host})
-    with urllib.request.urlopen(request, timeout=20) as answer:
+    with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
         return bytes(answer.read()), {name.lower(): value for name, value in answer.headers.items()}
 
 
 def answered(address: str, host: str | None = None) -> tuple[bytes, dict[str, str]]:
     """When the page is up."""
-    for _ in range(200):
+
+    def there() -> tuple[bytes, dict[str, str]] | None:
         with contextlib.suppress(OSError):
             return get(address, host)
-        time.sleep(0.1)
-    raise AssertionError("no answer")
+        return None
+
+    found = until(there)
+    assert found is not None
+    return found
 
 
 def test_the_page_answers_on_the_ipv6_loopback_and_stands_in_no_frame(tmp_path: Path) -> None:
@@ -514,8 +519,8 @@ def test_half_open_connections_do_not_hold_the_page(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], socket.socket]]:
-    """Connects to a server that thinks for longer than it waits for a request, and answers with 50 MB."""
+def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Callable[[], socket.socket], uvicorn.Server]]:
+    """Connects to a server that thinks for longer than it waits for a request, and answers with 50 MB; the server."""
     monkeypatch.setattr(patience, "REQUEST_S", 0.7)
     monkeypatch.setattr(patience, "ANSWER_S", 2.0)
 
@@ -530,25 +535,28 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], socket.s
     server = uvicorn.Server(settings)
     thread = threading.Thread(target=server.run, args=([listening],), daemon=True)
     thread.start()
-    yield lambda: socket.create_connection(listening.getsockname(), timeout=10)
+    yield lambda: socket.create_connection(listening.getsockname(), timeout=PATIENCE_S), server
     server.should_exit = server.force_exit = True
     thread.join(10)
 
 
-def test_a_client_that_is_slow_to_ask_or_to_read_is_ended(impatient: Callable[[], socket.socket]) -> None:
+def test_a_client_that_is_slow_to_ask_or_to_read_is_ended(
+    impatient: tuple[Callable[[], socket.socket], uvicorn.Server],
+) -> None:
+    connect, server = impatient
     request = b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
-    asks, reads = impatient(), impatient()
+    asks, reads = connect(), connect()
     asks.sendall(request)  # and no empty line
     reads.sendall(request + b"\r\n")
     with contextlib.suppress(ConnectionResetError):
         assert asks.recv(1) == b""
-    time.sleep(4.0)
+    until(lambda: not server.server_state.connections)  # it has ended both
     got = 0
     with contextlib.suppress(ConnectionResetError):
         while data := reads.recv(1 << 20):
             got += len(data)
     assert got < 40_000_000
-    quick = impatient()
+    quick = connect()
     quick.sendall(request + b"\r\n")
     whole = io.BytesIO()
     while data := quick.recv(1 << 20):

@@ -20,6 +20,7 @@ from paper_run import (
     compile_with_core,
     replay_header,
 )
+from processes import PATIENCE_S
 
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image import build_with
@@ -27,7 +28,6 @@ from pvid.board.replay_image import play
 from pvid.settings.enums import Core
 
 CORES: tuple[Core, ...] = ("f32", "q31")
-TIMEOUT_S = 300.0
 # An FPU, none, RISC-V without one; in the long form all but the ATmega328P, whose memory is too small, and the float32
 # of an AVR, which is another one. (On both AVRs test_targets plays the fixed-point core.)
 FEW = (("f32", "mps2-an386"), ("f32", "microbit"), ("q31", "microbit"), ("f32", "virt-rv32imac"))
@@ -137,6 +137,6 @@ def test_a_board_has_the_bits_of_the_paper_by_hand(core: Core, board: str, ticks
     image, _ = build_with(
         target, f"paper-{core}", {"replay_run.h": header, f"paper_{core}.h": model}, sizes, core, "strong"
     )
-    report = play(target, image, TIMEOUT_S)
+    report = play(target, image, PATIENCE_S)
     hashes = hashes_of(run.by_hand(core) if ticks < 1000 else run.on_core(core, tmp_path))
     assert report.ticks == len(run.counts) and report.differs_at(hashes) is None

@@ -9,7 +9,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from browser import chromium
 from click.testing import CliRunner
 from conftest import ROOT
 from logs import log_of
+from processes import PATIENCE_S, until
 from selenium import webdriver
 
 from pvid.base.errors import PvidError
@@ -42,7 +43,7 @@ def sent() -> list[bytes]:
 def get(address: str, path: str = "", host: str | None = None) -> bytes:
     """What the server answers."""
     request = urllib.request.Request(address + path, headers={} if host is None else {"Host": host})
-    with urllib.request.urlopen(request, timeout=120) as answer:
+    with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
         return bytes(answer.read())
 
 
@@ -52,16 +53,6 @@ def received(address: str) -> str:
         return str(json.loads(get(address, "state"))["received"])
     except urllib.error.URLError:
         return ""
-
-
-def until(done: Callable[[], Any], limit_s: float = 60) -> Any:
-    """Waits until this is true of something, and returns it."""
-    limit = time.monotonic() + limit_s
-    while time.monotonic() < limit:
-        if found := done():
-            return found
-        time.sleep(0.1)
-    raise AssertionError("it never came so far")
 
 
 def state_of(log: bytes, title: str = "") -> dict[str, Any]:
@@ -140,7 +131,7 @@ def test_the_page_ends_with_the_program_however_that_goes(tmp_path: Path) -> Non
     until(lambda: _answers(address))
     program.kill()
     program.communicate()
-    until(lambda: not _answers(address), 10)
+    until(lambda: not _answers(address))
 
 
 def test_log_refuses_an_address_before_it_records(tmp_path: Path) -> None:
@@ -269,7 +260,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
         assert all(one.startswith((f"http://{at}/", "data:", "blob:")) for one in asked), set(asked)
         assert complaints(browser) == []
         logger.send_signal(signal.SIGINT)
-        out, err = logger.communicate(timeout=30)
+        out, err = logger.communicate(timeout=PATIENCE_S)
         assert logger.returncode == 0, err
         assert f"live page: http://{at}/" in err
         until(lambda: browser.execute_script("return !alarm.hidden"))

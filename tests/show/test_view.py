@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from logs import samples_in
+from processes import PATIENCE_S, until
 from rich.console import Console
 
 from pvid.base.rounding import with_error, with_prefix
@@ -291,24 +293,9 @@ class Terminal:
                 got += data
         except OSError:
             pass  # the other end is closed
-        self.process.wait(timeout=20)
+        self.process.wait(timeout=PATIENCE_S)
         os.close(self.ours)
         return got.decode()
-
-
-def samples_in(path: Path) -> int:
-    """That the log holds."""
-    stream = LogStream()
-    if path.exists():
-        list(stream.feed(path.read_bytes()))
-    return stream.account.samples
-
-
-def wait_for_all(path: Path) -> None:
-    limit = time.monotonic() + 60
-    while samples_in(path) < TICKS:
-        assert time.monotonic() < limit, "the log never came so far"
-        time.sleep(0.1)
 
 
 def test_log_draws_on_a_terminal_and_leaves_the_last_picture(tmp_path: Path, board: Path) -> None:
@@ -323,7 +310,7 @@ def test_log_draws_on_a_terminal_and_leaves_the_last_picture(tmp_path: Path, boa
 
 def test_blocked_terminal_does_not_delay_the_log(tmp_path: Path, board: Path) -> None:
     terminal = Terminal(tmp_path)
-    wait_for_all(tmp_path / "out.pvlog")
+    until(lambda: samples_in(tmp_path / "out.pvlog") >= TICKS)
     terminal.process.send_signal(signal.SIGINT)
     seen = terminal.read_to_end()
     assert terminal.process.returncode == 0, seen

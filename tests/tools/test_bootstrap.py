@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 from packaging.requirements import Requirement
-from processes import heed_interrupts
+from processes import PATIENCE_S, heed_interrupts
 
 from pvid.base import user_cache
 
@@ -193,7 +193,7 @@ unlock
 touch may-gcc may-core; until [[ -e core ]]; do sleep 0.01; done; echo core: $(ls gcc qemu 2>/dev/null)
 touch may-qemu; await_packages; trap - EXIT; echo board: $(ls gcc qemu)
 """
-    out, err = installing(script).communicate(timeout=60)
+    out, err = installing(script).communicate(timeout=PATIENCE_S)
     assert out.splitlines() == ["environment: python3", "locked", "free", "core: gcc", "board: gcc qemu"]
     assert err == "pvid: installing Debian packages: python3 gcc qemu\n"
 
@@ -202,7 +202,7 @@ touch may-qemu; await_packages; trap - EXIT; echo board: $(ls gcc qemu)
 def test_a_package_that_cannot_be_installed_ends_the_set_up(broken: str, installing: Installing) -> None:
     script = f"broken={broken}; as_root() {{ :; }}; touch may-gcc may-qemu may-core; install_packages demo"
     process = installing(f"{script}; await_packages; echo 'the program'")
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out) == (2, "")
     assert err.splitlines()[1:] == [
         "pvid: updating the lists of Debian packages",
@@ -213,7 +213,7 @@ def test_a_package_that_cannot_be_installed_ends_the_set_up(broken: str, install
 
 def test_a_core_that_does_not_build_ends_the_set_up(installing: Installing, tmp_path: Path) -> None:
     process = installing("broken=core; touch may-gcc may-qemu may-core; install_packages demo; await_packages; echo on")
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out, err.splitlines()[1:]) == (2, "", ["pvid: no core"])
     assert (tmp_path / "qemu").exists()
 
