@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.headers import Headers
 from pvid.design.fir import FirBank
 
 _C_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -55,51 +52,3 @@ def bank_header(bank: FirBank, name: str, made_by: str) -> str:
         f"  needs PVID_MAX_WINDOW >= {bank.memory}",
     ]
     return _guarded(name, banner, [array])
-
-
-def array(name: str, values: npt.NDArray[Any], comment: str) -> str:
-    """A constant array `name` [n] of floats or integers, with one line for each row of the last axis of `values`."""
-    rows = values.reshape(-1, values.shape[-1])
-    if values.dtype.kind == "f":
-        return float_array(name, rows, comment)
-    lines = ["    " + ", ".join(map(str, row)) + "," for row in rows.tolist()]
-    head = f"static const PVID_TABLE {values.dtype}_t {name}[{values.size}] = {{"
-    return "\n".join([f"/* {comment} */", head, *lines, "};"])
-
-
-def struct_initializer(headers: Headers, struct: Any, pointers: Mapping[str, str], indent: str = "") -> str:
-    """The C99 initializer, by field names, that makes a struct equal to `struct`.
-
-    Parameters
-    ----------
-    headers : the declarations of its type
-    struct : its fields are numbers, arrays of them, structs and pointers
-    pointers : C expression of each pointer, by its field's name: "replay_weights", "&replay_design"; null without an
-        entry
-    indent : of the line where it begins
-    """
-    inner = f"{indent}    "
-    lines = []
-    for name, field in headers.ffi.typeof(struct).fields:
-        value, kind = getattr(struct, name), field.type.kind
-        if kind == "pointer" and name not in pointers:
-            continue
-        if kind == "struct":
-            text = struct_initializer(headers, value, pointers, inner)
-        elif kind == "array":
-            # C fills up with zeros; the device's bounds may be narrower than those of this machine
-            used = max((place + 1 for place, entry in enumerate(value) if entry != 0), default=1)
-            text = "{" + ", ".join(_literal(entry, field.type.item) for entry in value[0:used]) + "}"
-        else:
-            text = pointers[name] if kind == "pointer" else _literal(value, field.type)
-        lines.append(f"{inner}.{name} = {text},")
-    return "\n".join(["{", *lines, f"{indent}}}"])
-
-
-def _literal(value: Any, kind: Any) -> str:
-    """A number in C."""
-    if isinstance(value, float):
-        return float_literal(np.float32(value))
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"{int(value)}{'u' if kind.cname == 'uint32_t' else ''}"
