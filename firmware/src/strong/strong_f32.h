@@ -184,13 +184,19 @@ static PVID_NOINLINE void filter(const strong_window_f32 *self, const pvid_fir_b
     inputs_of_bank(sums, self->scale, in);
 }
 
-/* The inputs by five points `stride` apart in a ring whose oldest sample is at this place. Of a held input the mean is
- * from the samples around the instant, whatever the stride. */
-static inline void five_points(const strong_window_f32 *self, size_t oldest, float in[STRONG_INPUTS])
+/* The five points of each channel with the present sample, the oldest first, and the place of the next one: `stride`
+ * apart in the ring. */
+static inline void take_apart(strong_window_f32 *self, const float sample[STRONG_CHANNELS], float x[STRONG_CHANNELS][5])
 {
+    const size_t head = self->head;
+    const size_t oldest = place_after(self, head, 1);
     const size_t stride = self->stride;
     size_t place = oldest;
-    float x[STRONG_CHANNELS][5];
+    PVID_UNROLL
+    for (size_t c = 0; c < STRONG_CHANNELS; c++) {
+        self->points[head][c] = sample[c];
+    }
+    self->head = (uint16_t)oldest;
     PVID_UNROLL
     for (size_t i = 0; i < 5u; i++) {
         PVID_UNROLL
@@ -200,20 +206,36 @@ static inline void five_points(const strong_window_f32 *self, size_t oldest, flo
         place = place_after(self, place, stride);
     }
 #if STRONG_HELD
-    if (stride > 1u) {
-        static const bool held[STRONG_CHANNELS] = STRONG_HELD_CHANNELS;
-        place = place_after(self, oldest, (2u * stride) - 2u);
+    /* of a held input the mean is from the samples around the instant, whatever the stride */
+    static const bool held[STRONG_CHANNELS] = STRONG_HELD_CHANNELS;
+    place = place_after(self, oldest, (2u * stride) - 2u);
+    PVID_UNROLL
+    for (size_t i = 0; i < 4u; i++) {
         PVID_UNROLL
-        for (size_t i = 0; i < 4u; i++) {
-            PVID_UNROLL
-            for (size_t c = 0; c < STRONG_CHANNELS; c++) {
-                x[c][i] = held[c] ? self->points[place][c] : x[c][i];
-            }
-            place = place_after(self, place, 1);
+        for (size_t c = 0; c < STRONG_CHANNELS; c++) {
+            x[c][i] = held[c] ? self->points[place][c] : x[c][i];
         }
+        place = place_after(self, place, 1);
     }
 #endif
-    inputs_of_five((const float (*)[5])x, self->scale, in);
+}
+
+/* The same of points that follow each other: they move by a place, in which there are fewer steps than in a ring. The
+ * sample that made them complete has its place before the last. */
+static inline void take_next(strong_window_f32 *self, const float sample[STRONG_CHANNELS], float x[STRONG_CHANNELS][5])
+{
+    PVID_UNROLL
+    for (size_t c = 0; c < STRONG_CHANNELS; c++) {
+        PVID_UNROLL
+        for (size_t i = 0; i < 4u; i++) {
+            x[c][i] = self->points[i][c];
+        }
+        x[c][4] = sample[c];
+        PVID_UNROLL
+        for (size_t i = 0; i < 4u; i++) {
+            self->points[i][c] = x[c][i + 1u];
+        }
+    }
 }
 
 /* Takes a sample of each channel. When it completes a point and the window is full, writes the inputs of a row and
@@ -221,15 +243,14 @@ static inline void five_points(const strong_window_f32 *self, size_t oldest, flo
 static inline bool window_step(strong_window_f32 *self, const pvid_fir_bank_f32 *bank,
                                const float sample[STRONG_CHANNELS], float in[STRONG_INPUTS])
 {
-    const size_t head = self->head;
-    const size_t oldest = place_after(self, head, 1);
     if (self->five_points == STRONG_FIVE_POINTS_READY) {
-        PVID_UNROLL
-        for (size_t i = 0; i < STRONG_CHANNELS; i++) {
-            self->points[head][i] = sample[i];
+        float x[STRONG_CHANNELS][5];
+        if (self->stride == 1u) {
+            take_next(self, sample, x);
+        } else {
+            take_apart(self, sample, x);
         }
-        self->head = (uint16_t)oldest;
-        five_points(self, oldest, in);
+        inputs_of_five((const float (*)[5])x, self->scale, in);
         return true;
     }
     float filtered[STRONG_INPUTS]; /* in memory, where `in` itself is in registers */
