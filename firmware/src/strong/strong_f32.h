@@ -662,17 +662,8 @@ static inline pvid_reason move(strong_estimator_f32 *self, const float dp[STRONG
     return PVID_UPDATED;
 }
 
-/* A step from a projection that would move a parameter out of its bound is not taken; the parameter is pinned in the
- * next one. */
-static PVID_COLD bool is_blocked(strong_estimator_f32 *self, const float dp[STRONG_P])
-{
-    const pvid_p_bits blocked = outwards(self, dp);
-    self->blocked = (pvid_p_bits)((blocked != 0u) ? (blocked | (uint32_t)self->pinned) : 0u);
-    return blocked != 0u;
-}
-
-/* H0 with which pinned parameters are as good as known. */
-static PVID_COLD const float *raise_pinned(const strong_estimator_f32 *self, float prior[STRONG_P])
+/* H0 with which pinned parameters are as good as known. A pinned p[0] needs no excitation. */
+static PVID_COLD const float *raise_pinned(const strong_estimator_f32 *self, float prior[STRONG_P], float *kappa_min)
 {
     size_t diagonal = 0; /* of the upper triangle by rows */
     for (size_t a = 0; a < STRONG_P; a++) {
@@ -680,13 +671,24 @@ static PVID_COLD const float *raise_pinned(const strong_estimator_f32 *self, flo
             pvid_step_has_f32(self->pinned, a) ? ((self->s[diagonal] + self->prior[a]) * PVID_PIN) : self->prior[a];
         diagonal += STRONG_P - a;
     }
+    *kappa_min = pvid_step_has_f32(self->pinned, 0u) ? 0.0f : *kappa_min;
     return prior;
 }
 
-static PVID_COLD void hold_pinned(strong_estimator_f32 *self, float dp[STRONG_P])
+/* Where a parameter has been at its bound: pinned ones stay. A step from a projection that would move one out of its
+ * bound is not taken (false); the parameter is pinned in the next one. */
+static PVID_COLD bool goes(strong_estimator_f32 *self, float dp[STRONG_P], bool solved_for, bool projected)
 {
-    pvid_count_up(&self->counters.bounded);
-    pvid_step_hold_f32(STRONG_P, self->pinned, dp);
+    if (self->pinned != 0u) {
+        pvid_count_up(&self->counters.bounded);
+        pvid_step_hold_f32(STRONG_P, self->pinned, dp);
+    }
+    if (!(solved_for && projected)) {
+        return solved_for;
+    }
+    const pvid_p_bits blocked = outwards(self, dp);
+    self->blocked = (pvid_p_bits)((blocked != 0u) ? (blocked | (uint32_t)self->pinned) : 0u);
+    return blocked == 0u;
 }
 
 /* Solves (S + H0) dp = rhs and moves p; projected: rhs is of all rows. In one place, for all schedules. */
@@ -694,14 +696,14 @@ PVID_ALWAYS_INLINE pvid_reason solve(strong_estimator_f32 *self, const float rhs
 {
     float dp[STRONG_P];
     float raised[STRONG_P];
-    const float *prior = (self->pinned != 0u) ? raise_pinned(self, raised) : self->prior;
-    /* a pinned p[0] needs no excitation */
-    const float kappa_min = pvid_step_has_f32(self->pinned, 0u) ? 0.0f : self->config->estimator.kappa_min;
+    float kappa_min = self->config->estimator.kappa_min;
+    const float *prior = (self->pinned != 0u) ? raise_pinned(self, raised, &kappa_min) : self->prior;
     pvid_reason reason = solved(self->s, prior, kappa_min, rhs, dp);
-    if (self->pinned != 0u) {
-        hold_pinned(self, dp);
+    bool moves = reason == PVID_UPDATED;
+    if (self->counters.bounded > 0u) {
+        moves = goes(self, dp, moves, projected);
     }
-    if ((reason == PVID_UPDATED) && !(projected && (self->counters.bounded > 0u) && is_blocked(self, dp))) {
+    if (moves) {
         reason = move(self, dp);
     }
     return (reason == PVID_UPDATED) ? reason : pvid_count_held(&self->counters, reason);
@@ -719,7 +721,7 @@ static inline void project_all(strong_estimator_f32 *self, const strong_gradient
     PVID_UNROLL
     for (size_t a = 0; a < STRONG_P; a++) {
         force[a] += own[a];
-        rhs[a] = (self->gain * force[a]) + ((1.0f - self->gain) * rhs[a]);
+        rhs[a] = self->mixes ? ((self->gain * force[a]) + ((1.0f - self->gain) * rhs[a])) : force[a];
     }
     if ((STRONG_CONSTRAINTS == 0) && (self->counters.bounded > 0u)) {
         self->pinned = (pvid_p_bits)(outwards(self, force) | (uint32_t)self->blocked);

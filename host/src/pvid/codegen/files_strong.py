@@ -551,16 +551,14 @@ def _added_products(sums: StrongSums) -> list[str]:
 
 def _solve(n_p: int) -> list[str]:
     place = _triangle(n_p)
-    sum_of_diagonal = _added([f"d{a}" for a in range(n_p)])
-    lines = [f"const float d{a} = s[{place[a, a]}] + prior[{a}];" for a in range(n_p)]
     last = n_p - 1
-    lines += [
-        "/* infinity and NaN of any show in the sum; others that are not positive in their pivots */",
-        f"if (!pvid_positive_normal_f32(d{last}) || !pvid_positive_normal_f32({sum_of_diagonal})) {{",
-        "    return PVID_HELD_SINGULAR;",
-        "}",
-    ]
+    lines = []
     for b in reversed(range(n_p)):
+        lines.append(f"const float d{b} = s[{place[b, b]}] + prior[{b}];")
+        if b == last:
+            lines += [f"if (!pvid_positive_normal_f32(d{b})) {{", "    return PVID_HELD_SINGULAR;", "}"]
+        else:
+            lines.append(f"const float sum{b} = {f'sum{b + 1}' if b + 1 < last else f'd{last}'} + d{b};")
         pivot = f"d{b}"
         for k in range(b + 1, n_p):
             pivot = f"({pivot} - (l{b}_{k} * c{b}_{k}))"
@@ -573,6 +571,13 @@ def _solve(n_p: int) -> list[str]:
             for k in range(b + 1, n_p):
                 c = f"({c} - (l{a}_{k} * c{b}_{k}))"
             lines += [f"const float c{a}_{b} = {c};", f"const float l{a}_{b} = c{a}_{b} * i{b};"]
+    if last:
+        lines += [
+            "/* infinity and NaN of any show in the sum; others that are not positive in their pivots */",
+            "if (!pvid_positive_normal_f32(sum0)) {",
+            "    return PVID_HELD_SINGULAR;",
+            "}",
+        ]
     lines += [
         "const bool own = (v0 >= (2.0f * prior[0])) || !(kappa_min > 0.0f);",
         "if (!(v0 >= (kappa_min * d0)) || !own) {",
@@ -595,14 +600,6 @@ def _solve(n_p: int) -> list[str]:
 def _triangle(n_p: int) -> dict[tuple[int, int], int]:
     pairs = [(a, b) for a in range(n_p) for b in range(a, n_p)]
     return {pair: place for place, pair in enumerate(pairs)}
-
-
-def _added(terms: Sequence[str]) -> str:
-    """The sum from the left, with its brackets."""
-    total = ""
-    for one in terms:
-        total = f"({total} + {one})" if total else one
-    return total.removeprefix("(").removesuffix(")") if len(terms) > 1 else total or "0.0f"
 
 
 _ARRAYS = {"p": "p[{}]", "x": "x[{}]", "in": "in[{}]", "w": "weight[{}]", "s": "high[{0}] + low[{0}]"}
