@@ -1,6 +1,9 @@
 """The strong form of a described mechanism by the command line: identified, compared with its twin and on a board."""
 
 import json
+import tomllib
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +16,20 @@ from bench.kinds import KINDS
 from pvid.base.console import DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
-from pvid.board.strong_image import compare_on_board
+from pvid.board.boards import BOARDS
+from pvid.board.replay_image import play
+from pvid.board.strong_image import build_image, compare_on_board, hashes_of, standard_run
 from pvid.compare.strong import StrongComparison
-from pvid.configuration.strong import strong_design
+from pvid.configuration.strong import StrongDesign, five_point_design, strong_design
+from pvid.core.sources import ROOT
+from pvid.design.fir import finite_difference
 from pvid.identification import strong
 from pvid.model import Model
+from pvid.models.kapitza import paper_pendulum
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
+from pvid.settings.parts import GateConfig
 from pvid.sim.simulated_run import simulation_of
 
 TICKS = 1200
@@ -89,6 +98,30 @@ def test_constraints_have_the_hash_of_the_twin_on_a_board() -> None:
 def test_every_mechanism_has_the_bits_of_its_twin(name: str) -> None:
     run = StrongComparison.of(simulation_of(name).model, recording(name))
     assert run.found.equal and run.found.ticks == TICKS
+
+
+@cache
+def of_paper() -> StrongDesign:
+    """The paper's pendulum on the standard run, whose pivot is differentiated twice; gate and alarm on."""
+    samples, rate, bank = standard_run("kapitza").samples[:TICKS].astype(float), 50.0, finite_difference()
+    rig = simulation_of("kapitza").rig
+    u = bank.apply(samples[:, 0], rate)[2] / rig.knowns.get("l1", 0.3)
+    phi = samples[bank.delay : -bank.delay, 1] - rig.truth["c"]
+    run = Recording(np.arange(len(u)) / rate, {"u": u, "phi": phi}, rate)
+    design = five_point_design(paper_pendulum.model.compiled("paper_pendulum"), run)
+    return replace(design, config=replace(design.config, gate=GateConfig(10.0, 1.0)))
+
+
+@pytest.mark.parametrize(("schedule", "divider", "every"), [("exact", 1, 1), ("eighth", 1, 8), ("staged", 8, 0)])
+def test_a_tick_of_the_papers_pendulum_has_its_budget(schedule: str, divider: int, every: int) -> None:
+    config = of_paper().config
+    config = replace(config, exact_every=every, estimator=replace(config.estimator, divider=divider))
+    design = replace(of_paper(), config=config)
+    report = play(BOARDS["mps2-an386"], build_image(BOARDS["mps2-an386"], design)[0], 100.0)
+    budget = tomllib.loads((ROOT / "tests" / "budget.toml").read_text(encoding="utf-8"))["paper"][schedule]
+    assert report.differs_at(hashes_of(design)) is None
+    assert report.instructions_mean <= 1.02 * budget["mean"]
+    assert report.instructions_longest <= 1.02 * budget["longest"]
 
 
 def test_the_papers_law_solves_at_every_row() -> None:
