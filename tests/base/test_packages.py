@@ -7,6 +7,8 @@ import sys
 import pytest
 from conftest import ROOT
 
+from pvid.base.cluster import client as work_client
+from pvid.base.errors import PvidError
 from pvid.base.packages import PACKAGES, installing
 
 _WITHOUT_SERIAL = """
@@ -35,6 +37,15 @@ def test_a_port_without_pyserial_names_the_package_and_the_line_that_installs_it
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == f"pvid: this needs the Python package pyserial: {installing('serial')}\n"
+
+
+def test_work_in_parallel_without_dask_names_the_line_that_installs_all_that_a_batch_needs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    line = f"work in parallel needs the Python package dask distributed pyarrow: {installing('distributed')}"
+    with pytest.raises(PvidError, match=re.escape(line)), work_client(None, 2):
+        pass
 
 
 @pytest.mark.parametrize("module", sorted(PACKAGES))

@@ -3,10 +3,12 @@
 import os
 import re
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import unquote
 
@@ -23,7 +25,7 @@ from program import pvid
 from pvid.base.cluster import _distributed
 from pvid.base.console import CHANGED, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
-from pvid.cli.batch import command
+from pvid.cli.batch import _files, command
 from pvid.cli.main import commands
 from pvid.fleet import run as fleet
 from pvid.fleet.page import Fleet
@@ -126,6 +128,8 @@ def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(tmp_path:
     store.add(row_of(paths[0], question))
     with store.partial.open("ab") as file:
         file.write(b'\n{"key": "cut o')
+    job: Any = SimpleNamespace(out=out, question=question)
+    assert _files((str(tmp_path),), job) == paths  # the rows so far are no recording
     found = fleet.run(paths, question, Store(out), lambda _: None)
     assert inline == paths[1:] and [row.path for row in found] == paths and found == read_rows(out)
     assert all(row.failure is None for row in found)
@@ -134,6 +138,12 @@ def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(tmp_path:
     assert inline == [paths[1], paths[0]]
     fleet.run(paths, replace(question, core="q31"), Store(out), lambda _: None)
     assert inline[2:] == paths
+
+
+def test_a_lacking_writer_is_no_news_for_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ModuleNotFoundError, match="pyarrow"):
+        Store(tmp_path / "fleet.parquet")
 
 
 def test_a_log_is_identified_and_verified_or_says_why_not() -> None:

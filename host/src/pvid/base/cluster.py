@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from pvid.base.errors import PvidError
+from pvid.base.packages import lacking
 
 _CONNECT_S = 10
 _WORKERS_S = 30  # until a running scheduler must have a worker
@@ -101,4 +102,4 @@ def _distributed() -> Any:
     try:
         return importlib.import_module("distributed")
     except ImportError as error:
-        raise PvidError("work in parallel needs the Python package distributed, which is not installed") from error
+        raise lacking("work in parallel", "distributed") from error

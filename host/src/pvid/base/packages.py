@@ -12,8 +12,8 @@ from pvid.base.errors import PvidError
 
 # By module; the extras of host/pyproject.toml have their ranges of versions.
 PACKAGES = {
-    "dask": "dask distributed",
-    "distributed": "dask distributed",
+    "dask": "dask distributed pyarrow",
+    "distributed": "dask distributed pyarrow",
     "foxglove": "foxglove-sdk",
     "h5py": "h5py",
     "matplotlib": "matplotlib",

@@ -232,6 +232,7 @@ def _settled(folder: Path, job: _Job, every: int) -> Iterator[dict[str, tuple[in
 
 def _recordings(folder: Path, job: _Job) -> Iterator[Path]:
     """Files of a folder that can be recordings, but for those that the command writes."""
+    from pvid.fleet.store import PARTIAL
     from pvid.log.rig import LOG_SUFFIX
     from pvid.rig.run import SUFFIXES
 
@@ -239,7 +240,7 @@ def _recordings(folder: Path, job: _Job) -> Iterator[Path]:
     for path in folder.rglob("*"):
         whole = path.resolve()
         if path.name.lower().endswith((LOG_SUFFIX, *SUFFIXES)) and path.is_file():
-            if own.isdisjoint([whole, *whole.parents]):
+            if own.isdisjoint([whole, *whole.parents]) and not path.name.endswith(PARTIAL):
                 yield path
 
 

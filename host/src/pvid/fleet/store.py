@@ -16,6 +16,7 @@ from pvid.base.json_lines import append_json_line, read_json_lines
 from pvid.base.wording import in_utf8
 from pvid.fleet.row import Row
 
+PARTIAL = ".partial.jsonl"
 _SE = "_se"
 _PARTS = ("se_apart", "se_noise")  # of the error, a column each behind the value's name
 _FIXED = tuple(one.name for one in fields(Row) if one.name not in ("parameters", *_PARTS))
@@ -37,8 +38,9 @@ class Store:
             raise PvidError(f"{out}: rows are written as Parquet; name the file with .parquet")
         if not out.parent.is_dir():
             raise PvidError(f"{out}: there is no folder {out.parent}")
+        _arrow()  # that it is not installed is no news for the end
         self.out = out
-        self.partial = out.with_suffix(".partial.jsonl")
+        self.partial = out.with_suffix(PARTIAL)
         self.rows: dict[str, Row] = {}
         for row in (*read_rows(out), *self._begun()):
             self.rows[row.key] = row
