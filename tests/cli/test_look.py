@@ -98,6 +98,28 @@ def test_a_table_of_a_motor_is_known_as_people_write_it(tmp_path: Path) -> None:
         assert all("clip" not in remark for one in survey.facts for remark in one.remarks)
 
 
+@pytest.mark.parametrize(
+    ("mechanism", "head", "columns"),
+    [
+        ("buck_converter", "t,duty,Vout,Vin,IL", "d=duty,vin=Vin,i=IL,v=Vout"),
+        ("heater", "t,power_W,ambient_C,temp_C", "P=power_W,T=temp_C:C,Ta=ambient_C:C"),
+        ("quadrotor_axis", "t,throttle,gyro_x (deg/s)", "'u=throttle,p=gyro_x (deg/s)'"),
+        ("mecanum", "t,tau_fl,tau_fr,tau_rl,tau_rr,vx,vy,wz", "t1=tau_fl,t2=tau_fr,t3=tau_rl,t4=tau_rr,w=wz"),
+        ("first_order_step", "t,valve_percent,temp (°C)", "'u=valve_percent:%,y=temp (°C):1'"),
+        ("tank", "t,flow_lpm,level_cm", "q=flow_lpm,h=level_cm:cm"),
+        ("coasting_motor", "t,counts", "phi=counts:rev/N"),
+    ],
+)
+def test_columns_of_other_trades_are_known_by_their_names(
+    mechanism: str, head: str, columns: str, tmp_path: Path
+) -> None:
+    """Also where what surrounds or feeds a mechanism stands in front of what it does."""
+    signals = [numbers(1000 * np.sin((3 + k) * T), 0) for k in range(head.count(","))]
+    survey = surveyed(written(tmp_path / "lab.csv", head, [numbers(T), *signals]))
+    assert columns in [one.columns for one in proposals(survey) if one.mechanism == mechanism]
+    assert all("whole numbers" in one.remarks[-1] for one in survey.facts if not one.unit)
+
+
 def test_a_refusal_ends_with_the_commands_that_look_prints(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -164,7 +186,7 @@ def test_the_command_that_is_printed_identifies(mechanism: str, foreign: bool, t
     found = proposals(surveyed(file))
     assert found[0].mechanism == mechanism and bool(found[0].columns) == foreign
     command = shlex.split(found[0].command(str(file)))[1:]
-    command = [one.replace("l1=0.00", "l1=0.3") for one in command]
+    command = [one.replace("l1=VALUE", "l1=0.3") for one in command]
     answer = json.loads(pvid(*command, "--json", "--no-refine").stdout)
     assert answer["identified"]
     for name, truth in simulated_rig(mechanism).truth.items():

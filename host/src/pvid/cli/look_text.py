@@ -103,4 +103,4 @@ def _constants(one: Proposal) -> list[str]:
     if not one.constants:
         return []
     wanted = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in one.constants)
-    return [f"    with your own {wanted} in place of 0.00"]
+    return [f"    with your own {wanted} in place of VALUE"]

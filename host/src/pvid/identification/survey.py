@@ -27,6 +27,7 @@ from pvid.rig.columns import (
     Column,
     Columns,
     MissingColumnError,
+    is_usual,
     of_set_value,
     typed,
     unit_in,
@@ -59,6 +60,7 @@ _SPECTRUM = 1 << 17  # samples
 _SI = ("rad", "m", "s", "rad/s", "m/s", "V", "A", "N", "N*m", "K", "Hz", "W", "Pa", "kg", "m/s^2", "rad/s^2")
 _OFTEN_OTHER = {"rad/s": ("rpm", 0.0), "rad": ("deg", 3.2)}  # another usual unit, and numbers above which it can be
 _PHASES = {"V": "UW", "A": "BC"}  # of a machine, by letters that are also units
+_COUNTS = re.compile("count|pulse|tick|enc", re.I)
 _NO_NUMBERS = re.compile(r" has 0 rows of data|('.*') is not a number; (\d+) of \2 lines")
 
 
@@ -160,7 +162,10 @@ def unit_of_name(name: str, names: Sequence[str] = ()) -> str:
     sure |= not {name[:-1] + phase for phase in _PHASES.get(name[-1:], name[-1:])} & {*names, name}
     for si in _SI:
         found = unit_in(name, si)
-        if found is not None and (sure or found.lower() not in ALSO_WORDS):
+        if found is None:
+            continue
+        of_its_signal = name.endswith(f"_{found}") and found.isupper() and is_usual(name, si)  # power_W, temp_C
+        if sure or found.lower() not in ALSO_WORDS or of_its_signal:
             return found
     return ""
 
@@ -286,8 +291,11 @@ def _facts_of(name: str, unit: str, written: Float, recording: Recording, key: s
     remarks += _clipped(x, unit) if levels > 2 else ["has two values alone"]
     if blank > 0:
         remarks.append(f"{100 * blank:.2g} % of the rows have no number")
+    step = resolution_of(x)
+    if step == 1.0 and not unit and levels > _FEW_LEVELS:
+        remarks.append("whole numbers: counts, of an encoder or a converter?")
     reaches = _reaches(there, recording.sample_rate)
-    return ColumnFacts(key, name, unit, low, high, resolution_of(x), reaches, tuple(remarks))
+    return ColumnFacts(key, name, unit, low, high, step, reaches, tuple(remarks))
 
 
 def _clipped(x: Float, unit: str) -> list[str]:
@@ -348,11 +356,11 @@ class Proposal:
     doubts: tuple[str, ...] = ()
 
     def command(self, file: str) -> str:
-        """What to type next; a constant that must be stated is 0.00 there."""
+        """What to type next; a constant that must be stated is VALUE there."""
         parts = [typed_name(), "identify", shlex.quote(file), "--model", self.mechanism]
         if self.columns:
             parts += ["--columns", self.columns]
-        return " ".join([*parts, *(f"--set {name}=0.00" for name, _ in self.constants)])
+        return " ".join([*parts, *(f"--set {name}=VALUE" for name, _ in self.constants)])
 
 
 def proposals(survey: Survey) -> tuple[Proposal, ...]:
@@ -375,28 +383,38 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
     jumping = {one.name for one in survey.facts if one.jumps}
     moving = {one.name for one in description.signals if one.kind == "sensor" and not one.driven}
     for channel in channels_of(description):
-        free = [one for one in measured if one not in own.values() and _fits(stated.get(one), channel.unit)]
+        unit = channel.unit
+        free = [one for one in measured if one not in own.values() and _fits(stated.get(one), unit, channel.held)]
         free = [one for one in free if not (one in jumping and channel.name in moving)]
-        same = [one for one in free if one == channel.name]
-        alike = same or [one for one in free if channel.is_called(one)] or [one for one in free if stated.get(one)]
+        same = [one for one in free if one == channel.name] or [one for one in free if channel.is_named(one)]
+        alike = same or [one for one in free if channel.is_called(one)]
+        alike = alike or [one for one in free if unit and stated.get(one)]
         if not alike:
             return None
         own[channel.name] = min(alike, key=of_set_value)
     units = {one.name: one.unit for one in channels_of(description)}
     sizes = {one.name: max(abs(one.low), abs(one.high)) for one in survey.facts}
+    counts = {one.name for one in survey.facts if one.step == 1.0 and not one.unit}
     doubts: list[str] = []
     parts = [] if survey.time == "t" else [survey.time]
     for signal, name in own.items():
         unit = unit_in(name, units[signal]) or unit_of_name(name, survey.names)
+        other_kind = not units[signal] and scale_to("", stated.get(name, "1")) is None
+        if other_kind:
+            unit = "1"
+        elif units[signal] == "rad" and not unit and name in counts and _COUNTS.search(name):
+            unit = "rev/N"
+            doubts.append("with the number of counts of a turn in place of N")
         written = typed(survey.names, survey.names.index(name))
-        in_si = not unit or scale_to(units[signal], unit) == Scale()
+        in_si = not unit or scale_to(units[signal], unit) == Scale() and not other_kind
         other, largest = _OFTEN_OTHER.get(units[signal], ("", np.inf))
         if name not in stated and not unit and sizes[name] > largest:
             doubts.append(
                 f"{name} states no unit: {units[signal]} is assumed; write {signal}={written}:{other} for {other}"
             )
         if name != signal or not in_si:
-            parts.append(f"{signal}={written}" + ("" if in_si or unit_in_brackets(name) else f":{unit}"))
+            is_stated = unit_in_brackets(name) and not other_kind
+            parts.append(f"{signal}={written}" + ("" if in_si or is_stated else f":{unit}"))
     constants = tuple((one.name, one.unit) for one in description.knowns if one.required)
     columns = ",".join(parts)
     typed_columns = shlex.quote(columns) if columns else ""
@@ -404,9 +422,9 @@ def _proposal(mechanism: str, survey: Survey, measured: Sequence[str], stated: M
     return Proposal(mechanism, description.title, typed_columns, constants, used, tuple(doubts))
 
 
-def _fits(unit: str | None, si: str) -> bool:
-    """Whether a column that states this unit can be a signal in an SI unit."""
-    return not unit or scale_to(si, unit) is not None
+def _fits(unit: str | None, si: str, held: bool) -> bool:
+    """Whether a column that states this unit can be a signal in an SI unit; a sensor without one may be anything."""
+    return not unit or scale_to(si, unit) is not None or (not si and not held)
 
 
 def lines_of_a_model(survey: Survey) -> tuple[str, ...]:

@@ -41,19 +41,29 @@ class Channel:
         probe = _PROBE.fullmatch(name.strip())
         if probe is not None and probe["node"] != "t" and not is_unit(probe["node"]):
             return probe["node"] == self.name and probe["what"] == self.unit.replace("A", "I")
-        own = rf"^{re.escape(self.name)}([\s_(\[].*)?$"
-        usual = self.usual or "|".join(filter(None, (own, _USUAL_NAMES.get(self.unit))))
-        return re.search(usual, name, re.I) is not None
+        if self.usual:
+            return re.search(self.usual, name, re.I) is not None
+        return self.is_named(name) or is_usual(name, "held" if self.held and not self.unit else self.unit)
+
+    def is_named(self, name: str) -> bool:
+        """Whether a column has the signal's own name, which may carry a unit."""
+        return re.search(rf"^{re.escape(self.name)}([\s_(\[].*)?$", name, re.I) is not None
+
+
+def is_usual(name: str, kind: str) -> bool:
+    """Whether people call a signal of this SI unit so; of "" a sensor without one, of "held" an input without one."""
+    return kind in _USUAL_NAMES and re.search(_USUAL_NAMES[kind], name, re.I) is not None
 
 
 def of_set_value(name: str) -> int:
-    """Rank of a column among those that are called alike: 0 of what is measured, 2 of what is set, 1 of neither."""
+    """Rank of a column among those that are called alike: 0 of what is measured, 2 of what is set or surrounds, 1 of
+    neither."""
     parts = set(re.split(r"[\W_\d]+", name.lower()))
     return 0 if parts & _MEASURED else 2 if parts & _SET else 1
 
 
 _MEASURED = frozenset("ist act actual meas measured fbk feedback".split())
-_SET = frozenset("soll set setpoint sp ref reference cmd command commanded target des desired".split())
+_SET = frozenset("soll set setpoint sp ref reference cmd command commanded target des desired ambient air room".split())
 
 TIME = Channel(
     "t",
@@ -62,16 +72,21 @@ TIME = Channel(
     r"|created_at|last_changed|\bdoy\b|day.of.year|julian|^m?jd$",
 )
 
-# What people call a signal of a unit, besides its own name.
+# What people call a signal of a unit, besides its own name; of no unit what is measured and what is held.
 _USUAL_NAMES = {
-    "rad": r"phi|φ|angle|ang|theta|winkel|enc|deg|rad|pend|°",
-    "m": r"height|^h$|^h[^a-z]|pivot|cart|base|pos|disp|laser|dist|^x$|^y$|^z",
-    "rad/s": r"omega|ω|rate|speed|veloc|rpm|gyro|drehzahl|(?-i:^n(?![a-zA-Z]))",
+    "": r"output|response|temp|^y[_\s]|^pv$",
+    "held": r"duty|throttle|valve|pwm|^u[_\s]|input|stell",
+    "rad": r"phi|φ|angle|ang|theta|winkel|enc|deg|rad|pend|°|counts?$|pulses?$",
+    "m": r"height|^h$|^h[^a-z]|pivot|cart|base|pos|disp|laser|dist|^x$|^y$|^z|level",
+    "rad/s": r"omega|ω|rate|speed|veloc|rpm|gyro|drehzahl|(?-i:^n(?![a-zA-Z]))|^w_?[xyz]$",
     "m/s": r"speed|veloc|^v$",
-    "V": r"volt|spannung|^u$|^u[^a-z]|^v$",
-    "A": r"curr|strom|amp|^i$|^i[^a-z]",
+    "m^3/s": r"flow|pump",
+    "V": r"volt|spannung|^u$|^u[^a-z]|^v$|^[uv]_?(in|out|bat|dc)$",
+    "A": r"curr|strom|amp|^i$|^i[^a-z]|^i_?(l|out|bat|motor)$",
+    "K": r"temp|ambient|^t_",
     "N": r"force|kraft|load",
-    "N*m": r"torque|moment|drehmoment",
+    "N*m": r"torque|moment|drehmoment|^tau",
+    "W": r"power|leistung",
 }
 
 _PROBE = re.compile(r"(?P<what>[VI])\((?P<node>\w+)\)")  # of a circuit simulator: V(out), I(R1)
