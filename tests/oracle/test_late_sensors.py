@@ -111,3 +111,24 @@ def test_delay_that_only_the_windows_left_out_show(seed: int) -> None:
     text = " ".join(one.text for one in found.verdict.reasons if one.alarm)
     assert "i seems to be delayed by 0.000" in text or "may bias L by" in text
     assert np.all(np.abs(found.p - [R, L, B, M, c, k]) < 3 * found.se)
+
+
+@pytest.mark.by_day(1)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("cause", ["u acts late", "h follows behind a lag"])
+def test_cause_in_time_is_among_those_named_where_the_sensor_is_noisy(cause: str, seed: int) -> None:
+    """The mean of two samples has less noise than one of them, and a corrected lag more: neither decides."""
+    rng, n, dt, a, b = np.random.default_rng(seed), 4000, 0.5, 6.8e-3, 9.2e-3
+    level = 0.6 + 0.35 * steps(rng, n, 400)
+    h = swing([[-b]], [a], level, dt)[:, 0]
+    recorded = late(level, -2.5) if cause == "u acts late" else level
+    if cause != "u acts late":
+        for k in range(1, n):
+            h[k] = h[k - 1] + (h[k] - h[k - 1]) / 4
+    model = Model("vessel")
+    u, sensor = model.input("u", "1", hold="zoh"), model.sensor("h", "m", noise=1e-3)
+    gain, rate = model.unknown("a", "m/s", 1.3 * a), model.unknown("b", "1/s", 0.8 * b)
+    model.equation(sensor.d() - gain * u + rate * sensor)
+    run = {"u": recorded, "h": h + 1e-3 * rng.standard_normal(n)}
+    text = " ".join(one.text for one in of(model, run, dt).verdict.reasons if one.alarm)
+    assert cause in text

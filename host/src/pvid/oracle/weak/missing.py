@@ -24,7 +24,17 @@ from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.scores import FOLDS, Scores
 from pvid.oracle.weak.solve import Fit, of_fit, resumed
-from pvid.oracle.weak.terms import CONSTANT, JUMPS, OF_LOAD, OF_PARAMETER, UNUSUAL, UNUSUAL_LAWS, Act, Candidate, Course
+from pvid.oracle.weak.terms import (
+    CONSTANT,
+    JUMPS,
+    OF_LOAD,
+    OF_PARAMETER,
+    UNUSUAL,
+    UNUSUAL_KINDS,
+    Act,
+    Candidate,
+    Course,
+)
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
@@ -48,7 +58,9 @@ _TRIED = 0.3  # of the best share
 _DISTINCT = 0.01  # of a column's square, that is its own: a term with less is the parameters in another guise
 _SAME = 0.9999  # cosine of two columns, beside all parameters, that no run tells apart
 _RIVAL = 0.9  # of the best gain of likelihood
-_CHANGES = 0.5  # the same of what changes: its course is one of few, and what that leaves is no sign against another
+# The same of what changes: its course is one of few, and what that leaves is no sign against another; and of delays and
+# lags: what corrects a noisy signal adds to its noise.
+_ALIKE = 0.5
 _EQUAL, _BY_LUCK = 0.9999, 4.0  # of the best gain: the same column; what a gain is less or more by chance
 _MOST_RIVALS = 5
 _STAND_IN = 1.5  # times the chi^2 that is left with a term: without it no more is left, as it stood in for a later one
@@ -346,13 +358,15 @@ def word_of(one: Candidate) -> str:
 
 def _is_unusual(one: Candidate) -> bool:
     """Of terms that explain a run alike those that are less often the cause: a signal that is early, and the cosine of
-    an angle beside an offset of its sensor, and what changes during the run."""
-    return word_of(one) in UNUSUAL or one.kind in UNUSUAL_LAWS or isinstance(one.kind, Course)
+    an angle beside an offset of its sensor, a sensor's lag beside its delay, and what changes during the run."""
+    return word_of(one) in UNUSUAL or one.kind in UNUSUAL_KINDS or isinstance(one.kind, Course)
 
 
 def _rival(chosen: Candidate, one: Candidate) -> float:
     """Part of the best gain from which a term may be meant in place of the chosen one."""
-    return _CHANGES if isinstance(chosen.kind, Course) and isinstance(one.kind, Course) else _RIVAL
+    both = (chosen, one)
+    in_time = all(_is_in_time(own) and word_of(own) not in UNUSUAL for own in both)
+    return _ALIKE if in_time or all(isinstance(own.kind, Course) for own in both) else _RIVAL
 
 
 def _is_in_time(one: Candidate) -> bool:

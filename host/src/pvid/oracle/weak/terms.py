@@ -19,6 +19,8 @@ from pvid.oracle.weak.functions import Float
 from pvid.sim.imperfections import with_play
 
 _SMOOTHED = (21, 2)  # samples and degree, for the direction of a motion that has a play
+_RATE_TAPS = (3, 5, 9, 17, 33)  # samples of a rate
+_NOISE_ALONE = 1.5  # times the noise by which they differ
 _FORGOTTEN = 1e-18  # part of a sample behind a lag
 _NEWTON, _STEEPEST = 12, 0.1  # steps; least slope of a sensor that is not linear
 _TURNS = 2.0  # an angle that turns by less shows nothing that repeats with the turn [rad]
@@ -168,23 +170,32 @@ def _lagged(of: Recorded, tau: float) -> Float:
 
 
 def _shifted(of: Recorded, delay: float) -> Float:
-    """Without a delay of either sign [s]."""
-    place = np.arange(len(of.values), dtype=np.float64)
-    return np.interp(place + delay * of.rate, place, of.values)
+    """Without a delay of either sign [s]: on straight lines between samples.
+
+    The mean of two samples has half their noise, which would explain residuals that noise makes. Where the lines differ
+    from the nearest sample with its rate by noise alone, it is that.
+    """
+    place, samples = np.arange(len(of.values)), delay * of.rate
+    lines = np.interp(place + samples, place, of.values)
+    part = samples - round(samples)
+    near = np.clip(place + round(samples), 0, len(place) - 1)
+    shifted = (of.values + part / of.rate * _best_rate(of))[near]
+    noise = of.signal.sd * abs(part) * 2**0.5
+    return lines if float(np.std(lines - shifted)) > _NOISE_ALONE * noise else np.asarray(shifted)
 
 
 def _early(of: Recorded, _: float) -> Float:
     """What is added to a signal that is recorded late by a second, to first order: 1 s of its rate."""
-    return _rate(of, 3)
+    return _rate(of, _RATE_TAPS[0])
 
 
 def _ahead(of: Recorded, tau: float) -> Float:
     """Without a first-order lag of this time constant [s]."""
-    return np.asarray(of.values + tau * _rate(of, 3))
+    return np.asarray(of.values + tau * _best_rate(of))
 
 
 def _early_of_slow(of: Recorded, _: float) -> Float:
-    """The same of a motion that is slow beside its noise."""
+    """`_early` of a motion that is slow beside its noise."""
     return _rate(of, _SMOOTHED[0])
 
 
@@ -194,6 +205,25 @@ def _rate(of: Recorded, samples: int) -> Float:
     if len(out) >= samples:
         out[half:-half] = filtered(of.values, polynomial_weights(samples, 2, 1))[half:-half] * of.rate
     return out
+
+
+def _best_rate(of: Recorded) -> Float:
+    """From as many samples as make noise and blur together least."""
+    least = polynomial_weights(_RATE_TAPS[0], 2, 1)
+    sharp = best = _rate(of, len(least))
+    noise = (of.signal.sd * of.rate) ** 2
+    error = noise * float(np.sum(least**2))
+    for samples in _RATE_TAPS[1:]:
+        if samples > len(sharp):
+            break
+        weights, half = polynomial_weights(samples, 2, 1), samples // 2
+        apart, other = weights.copy(), _rate(of, samples)
+        apart[half - 1 : half + 2] -= least
+        blur = float(np.mean((other - sharp)[half:-half] ** 2)) - noise * float(np.sum(apart**2))
+        own = noise * float(np.sum(weights**2)) + max(blur, 0.0)
+        if own < error:
+            best, error = other, own
+    return best
 
 
 def _dead(of: Recorded, level: float) -> Float:
@@ -306,6 +336,7 @@ _DELAY = Act(
 )
 DELAY = replace(_DELAY, of=_early, levels=None, most=_quarter, exact=_DELAY)
 _SLOW = replace(_DELAY, text="follows behind a lag of {size}", of=_ahead, applies=is_measured, positive=True)
+_LAG = replace(_SLOW, of=_early, levels=None, most=_quarter, exact=_SLOW)
 _LATE = Act(
     "acts {word} by {size}",
     _shifted,
@@ -324,7 +355,7 @@ _SHOWS = Act(
     applies=is_measured,
     typed="{u} + {a}*{u}**3",
 )
-UNUSUAL, UNUSUAL_LAWS = ("advanced", "early"), (COSINE,)
+UNUSUAL, UNUSUAL_KINDS = ("advanced", "early"), (COSINE, _SLOW)
 
 # Levels lie so close that the column of one fits its neighbours' with a size within 0.4 to 2.5.
 ACTS = (
@@ -352,9 +383,7 @@ ACTS = (
     ),
     Act("acts behind a lag of {size}", _lagged, "time", levels=_samples(0.5, 1, 2, 4, 8, 16), applies=_acts),
     _LATE,
-    DELAY,
-    replace(DELAY, of=_early_of_slow),
-    replace(_SLOW, of=_early, levels=None, most=_quarter, exact=_SLOW),
+    *(replace(one, of=of) for of in (_early, _early_of_slow) for one in (DELAY, _LAG)),
     replace(_LATE, of=_early, levels=None, most=_quarter, exact=_LATE),
     Act(
         "acts as {u}*(1 {word} {size}*abs({u})/{top})",
