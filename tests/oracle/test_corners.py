@@ -191,3 +191,30 @@ def test_a_current_is_right_on_either_side_of_the_jumps_of_the_voltage(
     assert answer.found.verdict.status == "good"
     notes = [one for one in answer.recording.notes if "jump" in one]
     assert notes == [f"i jumps with u: its samples are those {edge} the jump"]
+
+
+@pytest.mark.parametrize("edge", ["before", "after"])
+@pytest.mark.parametrize("seed", [0, 1, 2, 5])
+def test_side_of_jumps_that_a_slow_current_hardly_shows_is_in_the_errors(edge: Edge, seed: int) -> None:
+    """Halfway R0 is 4.5 % off, 30 standard errors of noise."""
+    model = Model("cell")
+    i = model.input("i", "A", hold="zoh", reach=21, gain_sd=0)
+    v, h = model.sensor("v", "V", resolution=1.4e-3, reach=9, gain_sd=0), model.unmeasured("h", "V")
+    E, R0 = model.unknown("E", "V", 7.5), model.unknown("R0", "ohm", 5e-3)
+    R1, T1 = model.unknown("R1", "ohm", 3.5e-3), model.known("T1", "s", 12.4)
+    model.equation(v - E + R0 * i + h)
+    model.equation(T1 * h.d() + h - R1 * i)
+    rng, dt, n = np.random.default_rng(seed), 1.09, 3100
+    t = np.arange(n) * dt
+    growth = np.log(6) / t[-1]
+    current = 4 + 14 * np.sin(2 * np.pi * 5e-4 * np.expm1(growth * t) / growth)
+    slow = exact(np.array([[-1 / 12.4]]), np.array([5.3e-3 / 12.4]), current, dt)[:, 0]
+    set_to = np.concatenate([current[:1], current[:-1]]) if edge == "before" else current
+    signals = {"i": current, "v": read(7.47 - 8.6e-3 * set_to - slow, 1.4e-3, rng)}
+    answer = analysed(Recording(np.asarray(t, np.float64), signals, 1 / dt), model.compiled("cell"))
+    sure = answer.model.signal("v").edge == edge
+    for name, truth in {"R0": 8.6e-3, "R1": 5.3e-3}.items():
+        one = answer.values[name]
+        assert one.value is not None and one.se is not None
+        assert abs(one.value - truth) < 2 * one.se, name
+        assert one.se < 0.01 * truth if sure else 0.03 * truth < one.se < 0.1 * truth

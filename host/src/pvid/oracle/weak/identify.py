@@ -19,6 +19,7 @@ from pvid.oracle.weak.blur import shift_of
 from pvid.oracle.weak.choice import Scored, basis_of, ranked
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.drift import with_drift
+from pvid.oracle.weak.edges import other_side
 from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
 from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.feedback import of_feedback
@@ -248,6 +249,7 @@ def _judged(
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
     white = attempt("a white force as the error of the equations", lambda: as_white_force(fit))
     library = Library(run, used, fit)
+    side = attempt("the other side of jumps", lambda: other_side(compiled, run, sample_rate))
     blurred = attempt("rates that the filter blurs", lambda: shift_of(fit, run, used))
     by_gain = {
         one.name: or_nan(fit, partial(library.by_gain, one.name))
@@ -260,6 +262,7 @@ def _judged(
         verdict.widened(found.se, halves),
         *(one.moves for one in causes),
         *([] if blurred is None else [blurred]),
+        *([] if side is None else [side]),
         *([] if white is None else [white - fit.p]),
     ]
     se = np.sqrt(np.sum(np.square(parts), axis=0))
