@@ -113,7 +113,7 @@ def test_a_table_of_a_motor_is_known_as_people_write_it(tmp_path: Path) -> None:
 def test_columns_of_other_trades_are_known_by_their_names(
     mechanism: str, head: str, columns: str, tmp_path: Path
 ) -> None:
-    """Also where what surrounds or feeds a mechanism stands in front of what it does."""
+    """In any order: the air before the heated body, the supply before the output."""
     signals = [numbers(1000 * np.sin((3 + k) * T), 0) for k in range(head.count(","))]
     survey = surveyed(written(tmp_path / "lab.csv", head, [numbers(T), *signals]))
     assert columns in [one.columns for one in proposals(survey) if one.mechanism == mechanism]

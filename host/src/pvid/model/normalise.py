@@ -35,7 +35,8 @@ def with_scales(rows: Sequence[Row], unknowns: Sequence[Unknown]) -> list[Row]:
     waiting = [k for k, row in enumerate(rows) if not row.known]
     while waiting:
         fixed = sp.Matrix.vstack(sp.zeros(0, len(p)), *(at[k] for k in out))
-        kept = next((k for k in waiting if _follows(at[k], fixed)), None)
+        known = rank(fixed)
+        kept = next((k for k in waiting if known and _follows(at[k], fixed, known)), None)
         k = waiting[0] if kept is None else kept
         if kept is None:
             out[k] = divided(rows[k], _normaliser(rows[k], unknowns), p)
@@ -62,10 +63,9 @@ def with_own_scales(model: CompiledModel) -> CompiledModel | None:
     return replace(model, rows=tuple(rows)) if rows != list(model.rows) else None
 
 
-def _follows(gradients: sp.Matrix, fixed: sp.Matrix) -> bool:
-    """Whether one of these theta is, near any point, a function of the fixed ones."""
-    known = rank(fixed)
-    return known > 0 and any(rank(fixed.col_join(one)) == known for one in map(gradients.row, range(gradients.rows)))
+def _follows(gradients: sp.Matrix, fixed: sp.Matrix, known: int) -> bool:
+    """Whether one of these theta is, near any point, a function of the fixed ones, whose rank is `known`."""
+    return any(rank(fixed.col_join(one)) == known for one in map(gradients.row, range(gradients.rows)))
 
 
 def _derivatives(part: Part) -> int:

@@ -6,7 +6,7 @@ reads, the value after it; a sensor that averages, one between.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,10 +34,11 @@ def with_edges(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_ra
 
     Cost: nine fits where a sensor jumps with a held input; nothing elsewhere.
     """
-    sides = _sides(model, run, sample_rate)
+    sensors = _jumping(model)
+    sides = _sides(model, sensors, run, sample_rate)
     best = min(sides, key=lambda one: sides[one].chi2, default=EDGES[0])
     least = sides[EDGES[0]].chi2 if EDGES[0] in sides else np.inf
-    return _sampled(model, best) if best in sides and sides[best].chi2 < least - _CLEAR else model
+    return _sampled(model, sensors, best) if best in sides and sides[best].chi2 < least - _CLEAR else model
 
 
 def other_side(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> Float | None:
@@ -49,7 +50,8 @@ def other_side(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_ra
 
     Cost: that of `with_edges`; next to nothing behind it, whose scores are kept.
     """
-    sides, sensors = _sides(model, run, sample_rate), _jumping(model)
+    sensors = _jumping(model)
+    sides = _sides(model, sensors, run, sample_rate)
     own = sides.get(model.signal(sensors[0]).edge) if sensors else None
     if own is None:
         return None
@@ -66,16 +68,18 @@ class _Side:
     p: Float
 
 
-def _sides(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> dict[Edge, _Side]:
-    """Those that have an estimate; none where no sensor jumps with a held input."""
-    if not _jumping(model):
+def _sides(
+    model: CompiledModel, sensors: Sequence[str], run: Mapping[str, npt.ArrayLike], sample_rate: float
+) -> dict[Edge, _Side]:
+    """Those that have an estimate, of the sensors that jump with a held input; none where there are none."""
+    if not sensors:
         return {}
     longest = max((part.stop - part.start for part in segments_of(samples_of(model, dict(run)))), default=0)
     basis = basis_of(ready(model), sample_rate)
     designs = [made(basis, window_s=one) for one in lengths(longest, sample_rate)[-_DESIGNS:]]
     sides: dict[Edge, _Side] = {}
     for edge in EDGES:
-        other = ready(_sampled(model, edge))
+        other = ready(_sampled(model, sensors, edge))
         scores = [score_of(other, run, design, None, False) for design in designs]
         found = [one for one in scores if one is not None]
         if found and len(found) == len(scores):
@@ -89,8 +93,7 @@ def _jumping(model: CompiledModel) -> list[str]:
     return list(dict.fromkeys(sensor for sensor, _ in feedthroughs(model)))
 
 
-def _sampled(model: CompiledModel, edge: Edge) -> CompiledModel:
-    sensors = _jumping(model)
+def _sampled(model: CompiledModel, sensors: Sequence[str], edge: Edge) -> CompiledModel:
     return replace(
         model, signals=tuple(replace(one, edge=edge) if one.name in sensors else one for one in model.signals)
     )

@@ -20,7 +20,7 @@ from pvid.sim.imperfections import with_play
 
 _SMOOTHED = (21, 2)  # samples and degree, for the direction of a motion that has a play
 _RATE_TAPS = (3, 5, 9, 17, 33)  # samples of a rate
-_NOISE_ALONE = 1.5  # times the noise by which they differ
+_NOISE_ALONE = 1.5  # times their noise, by which two ways to take back a delay differ
 _FORGOTTEN = 1e-18  # part of a sample behind a lag
 _NEWTON, _STEEPEST = 12, 0.1  # steps; least slope of a sensor that is not linear
 _TURNS = 2.0  # an angle that turns by less shows nothing that repeats with the turn [rad]
@@ -170,18 +170,20 @@ def _lagged(of: Recorded, tau: float) -> Float:
 
 
 def _shifted(of: Recorded, delay: float) -> Float:
-    """Without a delay of either sign [s]: on straight lines between samples.
+    """Without a delay of either sign [s]: on straight lines between samples, or by the nearest sample and its rate.
 
-    The mean of two samples has half their noise, which would explain residuals that noise makes. Where the lines differ
-    from the nearest sample with its rate by noise alone, it is that.
+    The mean of two samples has half their noise, which would explain residuals that noise makes. So the second way is
+    taken where both differ by noise alone.
     """
     place, samples = np.arange(len(of.values)), delay * of.rate
-    lines = np.interp(place + samples, place, of.values)
+    lines = np.asarray(np.interp(place + samples, place, of.values))
     part = samples - round(samples)
+    if not of.signal.sd or not part:
+        return lines
     near = np.clip(place + round(samples), 0, len(place) - 1)
-    shifted = (of.values + part / of.rate * _best_rate(of))[near]
+    shifted = np.asarray((of.values + part / of.rate * _best_rate(of))[near])
     noise = of.signal.sd * abs(part) * 2**0.5
-    return lines if float(np.std(lines - shifted)) > _NOISE_ALONE * noise else np.asarray(shifted)
+    return lines if float(np.std(lines - shifted)) > _NOISE_ALONE * noise else shifted
 
 
 def _early(of: Recorded, _: float) -> Float:
