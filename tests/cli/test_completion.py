@@ -43,6 +43,11 @@ def test_what_is_nearly_a_command_is_proposed() -> None:
     assert far.exit_code == 2 and "there is no command 'qqq'" in far.stderr and "mean" not in far.stderr
 
 
+def test_the_nearest_option_alone_is_proposed(tmp_path: Path) -> None:
+    near = pvid(tmp_path, "identify", "run.csv", "--modle", "dc_motor")
+    assert "No such option '--modle'. Did you mean '--model'?" in near.stderr
+
+
 def test_what_a_missing_option_can_be_stands_in_its_sentence(tmp_path: Path) -> None:
     missing = pvid(tmp_path, "deploy", "dc_motor", "-o", "x")
     assert "Missing option '--for'. Choose from: arduino, platformio, esp-idf" in missing.stderr

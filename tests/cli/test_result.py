@@ -203,6 +203,8 @@ def test_a_notebook_shows_a_model_with_its_equations() -> None:
         r"J \ddot{\phi} + \phi c_{1} &= 0" in model._repr_latex_()
         or r"J \ddot{\phi} + c_{1} \phi" in model._repr_latex_()
     )
+    assert repr(model).splitlines()[0] == "Model('a <b> mass')" and "J*phi''" in repr(model)
+    assert repr(model).splitlines()[2:] == ["    signal: phi [rad]", "    unknown: J [kg*m^2], c1 [N*m]"]
     assert "a &lt;b&gt; mass" in model._repr_html_() and "<td>kg*m^2</td>" in model._repr_html_()
 
 

@@ -132,6 +132,8 @@ def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(tmp_path:
     assert _files((str(tmp_path),), job) == paths  # the rows so far are no recording
     found = fleet.run(paths, question, Store(out), lambda _: None)
     assert inline == paths[1:] and [row.path for row in found] == paths and found == read_rows(out)
+    shutil.copy(out, tmp_path / "of another day.parquet")
+    assert _files((str(tmp_path),), job) == paths
     assert all(row.failure is None for row in found)
     shutil.copy(paths[1], paths[0])
     fleet.run(paths, question, Store(out), lambda _: None)

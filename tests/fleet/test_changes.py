@@ -11,7 +11,7 @@ import pytest
 from browser import chromium
 from fleet_rows import DAY, row
 
-from pvid.fleet.changes import FALSE_ALARMS, Change, Series
+from pvid.fleet.changes import FALSE_ALARMS, Change, Series, series_of
 from pvid.fleet.dates import began_of, boards_of
 from pvid.fleet.page import Fleet, page, sentence
 from pvid.fleet.row import Row
@@ -52,6 +52,15 @@ def test_two_recordings_are_compared_with_all_but_scale() -> None:
     assert one == Change("step", 0.0, DAY, 10.0, 10.5)
 
 
+def test_a_recording_with_larger_errors_of_its_own_is_no_change() -> None:
+    """The equations are off by what the other recordings do not share: the last one was published by another fit."""
+    rows = fleet()[:10]
+    last = replace(rows[-1], parameters={"g": (9.6, 0.3, "m/s^2")})
+    (found,) = series_of([*rows[:-1], replace(last, se_apart={"g": 0.1})])
+    assert not found.changes
+    assert len(series_of([*rows[:-1], last])[0].changes) == 1
+
+
 def test_the_mean_is_since_the_last_step_and_not_below_what_recordings_share() -> None:
     value = np.where(np.arange(20) < 12, 10.0, 11.0) + np.random.default_rng(1).normal(0, NOISE, 20)
     mean, se = series(value).latest
@@ -79,7 +88,9 @@ def fleet(**other: Any) -> list[Row]:
     return still + [row("motors/moving", k + 1, 9.5 - 0.19 * k / 9 + noise[1, k], 0.3, **apart) for k in range(10)]
 
 
-@pytest.mark.parametrize("warning", [None, "phi is late by 2.1e-05 s"])
+@pytest.mark.parametrize(
+    "warning", [None, "phi is late by 2.1e-05 s", "phi is late by 2.1e-05 s\nSlow: sample at 9 Hz."]
+)
 def test_the_page_says_what_changed_with_warnings_or_without(warning: str | None) -> None:
     found = Fleet.of(fleet(warning=warning))
     (alarm,) = found.changes(alarms=True)
@@ -88,6 +99,7 @@ def test_the_page_says_what_changed_with_warnings_or_without(warning: str | None
     text = page(found, "pvid batch <all>")
     assert f'<strong class="bad">{words}</strong>' in text and "pvid batch &lt;all&gt;" in text
     assert "g 3.2 %" in text and ("2.1e-05 s (alike in 20 of 20 recordings)" in text) == (warning is not None)
+    assert ("9 Hz. (alike in 20 of 20 recordings)" in text) == ("\n" in (warning or ""))
     assert text.count("as of all") == (20 if warning else 0) and "http:" not in text.split("<svg")[0]
     assert "refresh" not in text and 'http-equiv="refresh" content="7"' in page(found, "", refresh=7)
 
@@ -173,8 +185,10 @@ def test_recordings_of_a_board_share_a_folder_or_a_name(groups: dict[str, tuple[
 
 def test_a_board_that_differs_from_all_others_is_named() -> None:
     def fleet(last: float) -> Fleet:
-        values = {"b1": 10.0, "b2": 10.1, "b3": 9.9, "b4": last}
+        values = {"b1": 10.0, "b2": 10.1, "b3": 9.9, "b4": last, **dict.fromkeys(("b5", "b6", "b7"), 10.0)}
         return Fleet.of([row(board, day, value + 0.001 * day) for board, value in values.items() for day in range(3)])
 
-    assert fleet(20.0).odd == ["b4: g is 20.0 m/s², of all other boards 9.9 to 10.1"]
+    assert ">● b4<" in page(fleet(20.0), "") and fleet(20.0).odd == [
+        ("b4", "b4: g is 20.0 m/s², of all other boards 9.9 to 10.1")
+    ]
     assert not fleet(10.2).odd

@@ -173,3 +173,11 @@ def test_a_current_that_follows_short_pulses_of_the_voltage_has_no_error_codes()
     quick = {"V": pulses, "i": np.rint(pulses / 1.2 / 0.005) * 0.005}
     pulsed = replace(recording, signals={**recording.signals, **quick})
     assert without_wild_samples(pulsed, model).signals["i"] is pulsed.signals["i"]
+
+
+def test_noise_of_a_current_beyond_that_of_its_rig_is_no_error_code() -> None:
+    """In steps of 1 mA, the same far value comes a few times among 40 000 samples of a noise of 10 mA."""
+    current = np.round(np.random.default_rng(1).normal(0, 0.01, 40_000), 3)
+    signals = {"V": np.full(40_000, 3.0), "i": current, "phi": np.linspace(0.0, 9.0, 40_000)}
+    noisy = Recording(np.arange(40_000) / 1000, signals, 1000.0)
+    assert without_wild_samples(noisy, compiled_of("dc_motor")).signals["i"] is current

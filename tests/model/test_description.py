@@ -31,7 +31,7 @@ SHIPPED = {  # theta of each kind of row, unknowns
     "coast_down": ([3], 3),
     "coasting_motor": ([3], 3),
     "cooling": ([2], 2),
-    "first_order_step": ([5], 4),
+    "first_order_step": ([6], 4),
     "free_pendulum": ([4], 4),
     "heater": ([3], 3),
     "mass_on_spring": ([5], 5),

@@ -93,10 +93,8 @@ def command(patterns: tuple[str, ...], **given: Any) -> int:
         write_stderr(f"pvid: {row.failure if row.path in row.failure else f'{row.path}: {row.failure}'}")
     if len(failures) > _SHOWN:
         write_stderr(f"pvid: {len(failures) - _SHOWN} more failures are in {job.page}")
-    for alarm in alarms_of(fleet):
-        click.echo(f"changed: {alarm}")
-    for odd in fleet.odd:
-        click.echo(f"apart: {odd}")
+    for line in _named(fleet):
+        click.echo(line)
     click.echo(f"rows: {job.out}; page: {job.page}")
     return _code(fleet)
 
@@ -131,11 +129,11 @@ def watch(folder: Path, every: int, **given: Any) -> int:
             seen = files
             for row in new:
                 click.echo(f"{row.path}: {row.failure or row.verdict}")
-            alarms = alarms_of(fleet) if fleet else []
-            for alarm in alarms:
-                if alarm not in told:
-                    click.echo(f"changed: {alarm}")
-            told.update(alarms)
+            lines = _named(fleet) if fleet else []
+            for line in lines:
+                if line not in told:
+                    click.echo(line)
+            told.update(lines)
     except KeyboardInterrupt:
         click.echo(f"rows: {job.out}; page: {job.page}" if fleet else f"{folder}: no recording came")
     return NOTHING_IDENTIFIED if fleet is None else _code(fleet)
@@ -198,11 +196,12 @@ class _Job:
         return fleet
 
 
-def alarms_of(fleet: Fleet) -> list[str]:
-    """A sentence each."""
+def _named(fleet: Fleet) -> list[str]:
+    """A sentence on each alarm, and on each board that differs from all others."""
     from pvid.fleet.page import sentence
 
-    return [sentence(*one) for one in fleet.changes(alarms=True)]
+    changed = [f"changed: {sentence(*one)}" for one in fleet.changes(alarms=True)]
+    return changed + [f"apart: {words}" for _, words in fleet.odd]
 
 
 def _code(fleet: Fleet) -> int:
@@ -231,8 +230,8 @@ def _settled(folder: Path, job: _Job, every: int) -> Iterator[dict[str, tuple[in
 
 
 def _recordings(folder: Path, job: _Job) -> Iterator[Path]:
-    """Files of a folder that can be recordings, but for those that the command writes."""
-    from pvid.fleet.store import PARTIAL
+    """Files of a folder that can be recordings, but for those that a batch writes."""
+    from pvid.fleet.store import are_rows
     from pvid.log.rig import LOG_SUFFIX
     from pvid.rig.run import SUFFIXES
 
@@ -240,7 +239,7 @@ def _recordings(folder: Path, job: _Job) -> Iterator[Path]:
     for path in folder.rglob("*"):
         whole = path.resolve()
         if path.name.lower().endswith((LOG_SUFFIX, *SUFFIXES)) and path.is_file():
-            if own.isdisjoint([whole, *whole.parents]) and not path.name.endswith(PARTIAL):
+            if own.isdisjoint([whole, *whole.parents]) and not are_rows(path):
                 yield path
 
 

@@ -86,6 +86,7 @@ def main() -> None:
     except click.NoSuchOption as error:
         from pvid.cli.rig_keys import setting_for  # the rig file's keys, which only this needs
 
+        del (error.possibilities or [])[1:]  # the nearest one; click sorts them by letters
         write_stderr(f"pvid: {setting_for(error) or _usage(error)}")
         code = BAD_INPUT
     except (click.exceptions.Abort, KeyboardInterrupt):

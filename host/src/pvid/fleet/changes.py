@@ -1,7 +1,8 @@
 """What changed in the parameters of a fleet: steps and trends of a board over its recordings that are beyond chance.
 
 The recordings of one board share errors of scale, and mostly those of the model: both are the same before and after and
-say nothing about a change. So a change is compared with the noise of the recordings and with their own scatter.
+say nothing about a change. So a change is compared with the noise of the recordings and with their own scatter, and
+with what the errors of a recording exceed the usual ones of its board by, which the others do not share.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class Series:
     ----------
     t : seconds since 1970
     value : [unit]
-    noise : standard error by noise alone [unit]
+    noise : standard error of what its recordings do not share [unit]
     apart : standard error without scale [unit]
     chance : probability that a change is found where there is none
     """
@@ -171,5 +172,6 @@ def series_of(rows: Sequence[Row]) -> list[Series]:
     out = []
     for (board, name, unit), own in points.items():
         t, value, noise, apart = np.array(own).T
+        noise = np.sqrt(noise**2 + np.maximum(0.0, apart**2 - np.median(apart) ** 2))
         out.append(Series(board, name, unit, t, value, noise, apart, FALSE_ALARMS / len(points)))
     return out

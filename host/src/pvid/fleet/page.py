@@ -27,7 +27,7 @@ from pvid.oracle.weak.words import WIDE
 from pvid.show import answer_figure as of
 from pvid.show.document import document, picture, table, text
 
-_MOST_COLORS = 6  # boards with a colour of their own; of more, those that changed
+_MOST_COLORS = 6  # boards with a colour of their own; of more, those that are named
 _COLORS = ("C0", "C1", "C2", "C4", "C8", "C9")
 _PANEL = (4.0, 2.2)  # inches
 _SHARED = 0.5  # of the recordings, from which on a warning is one of all
@@ -64,8 +64,8 @@ class Fleet:
         )
 
     @cached_property
-    def odd(self) -> Sequence[str]:
-        """A sentence on each board whose value is far from those of all others, which agree; the farthest first."""
+    def odd(self) -> Sequence[tuple[str, str]]:
+        """Each board whose value is far from those of all others, which agree, and a sentence; the farthest first."""
         found = []
         for own in _by_parameter(self).values():
             latest = np.array([one.latest[0] for one in own])
@@ -78,8 +78,8 @@ class Fleet:
                     shown, *ends = (with_error(each / scale, off / scale / 10)[0] for each in (value, *_ends(others)))
                     among = " to ".join(dict.fromkeys(ends))
                     words = f"{one.board}: {one.name} is {shown} {unit}".rstrip() + f", of all other boards {among}"
-                    found.append((off / abs(usual), words))
-        return [words for _, words in sorted(found, reverse=True)]
+                    found.append((off / abs(usual), one.board, words))
+        return [(board, words) for _, board, words in sorted(found, reverse=True)]
 
     @property
     def title(self) -> str:
@@ -160,7 +160,8 @@ def _changed(fleet: Fleet) -> Iterator[str]:
     else:
         yield f"<p>No parameter changed by {percent(fleet.alarm)} or more.</p>"
     if fleet.odd:
-        yield f"<p>Boards apart from the others:</p><ul>{''.join(f'<li>{text(one)}</li>' for one in fleet.odd)}</ul>"
+        items = "".join(f"<li><strong>{text(words)}</strong></li>" for _, words in fleet.odd)
+        yield f"<p>Boards apart from the others:</p><ul>{items}</ul>"
     if small:
         items = "".join(f"<li>{text(sentence(*one))}</li>" for one in small)
         heading = f"{_count(len(small), 'smaller change')}, beyond chance"
@@ -193,7 +194,7 @@ def _common(fleet: Fleet) -> Iterator[str]:
 
 
 def _warnings(row: Row) -> list[str]:
-    return row.warning.split("; ") if row.warning else []
+    return row.warning.splitlines() if row.warning else []
 
 
 def _kind(warning: str) -> str:
@@ -246,15 +247,15 @@ def _recordings(fleet: Fleet, folder: Path) -> str:
         date = _date(row.began, clock=True) if row.began else "-"
         by = " (time of the file)" if row.began and row.dated == "file" else ""
         verdict = (row.verdict or "failed").replace("_", " ")
-        lines.append([date + by, name, text(verdict), text("; ".join(one for one in words if one))])
+        lines.append([date + by, name, text(verdict), "<br>".join(text(one) for one in words if one)])
     return table(("date (UTC)", "recording", "verdict", "why"), lines, cards=True)
 
 
 def _figure(fleet: Fleet) -> str:
     """A picture for each parameter: value and error without scale over the date."""
     boards = list(dict.fromkeys(one.board for one in fleet.series))
-    changed = list(dict.fromkeys(series.board for series, _ in fleet.changes(alarms=True)))
-    colored = (boards if len(boards) <= _MOST_COLORS else changed)[:_MOST_COLORS]
+    named = [series.board for series, _ in fleet.changes(alarms=True)] + [board for board, _ in fleet.odd]
+    colored = (boards if len(boards) <= _MOST_COLORS else [*dict.fromkeys(named)])[:_MOST_COLORS]
     colors = dict(zip(colored, map(to_hex, _COLORS), strict=False))
     keys = "".join(
         f'<span class="key" style="color:{color}">● {text(board)}</span> ' for board, color in colors.items()
@@ -272,7 +273,7 @@ def _figure(fleet: Fleet) -> str:
     return (
         f'<p>{keys}</p><div class="multiples">{"".join(pictures)}</div><p class="quiet">Each parameter of each board, '
         "with one standard error by noise and what the equations lack. Open: a recording with a warning."
-        f"{'' if len(boards) <= _MOST_COLORS else ' Grey: boards without an alarm.'}</p>"
+        f"{'' if len(boards) <= _MOST_COLORS else ' Grey: all other boards.'}</p>"
     )
 
 

@@ -77,7 +77,7 @@ class Row:
     began : seconds since 1970
     dated : what says so: "log", "recording", "name" or, of a run without a date, "file"
     samples : that were identified
-    identified, verdict, status, warning : as in pvid.Result; None where the recording was refused
+    identified, verdict, status, warning : as in pvid.Result, the warning a line each; None: it was refused
     verified : of a log: EQUAL, or the first difference, or why it was not; None: not asked, or no log
     failure : why there is no result; None: there is one
     parameters : name -> (value, standard error, unit); empty where nothing was identified
@@ -147,7 +147,7 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
         result.identified,
         result.verdict,
         result.status,
-        result.details["warning"],
+        _a_line_each(result.details["warning"], result.details.get("reasons", {})),
         _all_verified(places, question) if question.verify else None,
         parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
         took=time.monotonic() - start,
@@ -157,6 +157,12 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
         report=report,
         dated=dated,
     )
+
+
+def _a_line_each(warning: str | None, reasons: Mapping[str, str]) -> str | None:
+    """A warning with its sentences in lines."""
+    alarms = [one for one in reasons.values() if warning and one in warning]
+    return "\n".join(alarms) if alarms and " ".join(alarms) == warning else warning
 
 
 def _reported(result: Result, folder: str, path: Path, key: str) -> str:

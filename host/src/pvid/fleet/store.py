@@ -122,6 +122,17 @@ def read_rows(path: Path) -> list[Row]:
     return rows
 
 
+def are_rows(path: Path) -> bool:
+    """Whether a file in the folder of recordings was written by a batch, under any name."""
+    if path.name.endswith(PARTIAL) or path.suffix != ".parquet":
+        return path.name.endswith(PARTIAL)
+    _, parquet = _arrow()
+    try:
+        return set(_FIXED) - _NEWER <= set(parquet.read_schema(path).names)
+    except Exception:  # as above: it fails as a recording
+        return False
+
+
 def _arrow() -> tuple[Any, Any]:
     import pyarrow
     import pyarrow.parquet

@@ -28,8 +28,9 @@ _MOST = 1e-3  # of the samples: where more are, they belong to the signal
 _MEDIAN_OF, _FAR, _RUN, _NEIGHBOUR = 11, 10.0, 3, 0.2
 # An error code: so many samples in a row, so often where both neighbours agree, while no input moves by so much of its
 # range, nor did a few samples before: a fast current has its peak that long after a step of the voltage. Off by few
-# steps of the sensor's resolution is no code.
-_CODES, _FEWEST_CODES, _STEADY, _LATER, _STEPS = 8, 4, 0.05, 3, 4
+# steps of the sensor's resolution, or times the noise that the samples themselves have, is no code.
+_CODES, _FEWEST_CODES, _STEADY, _LATER, _STEPS, _NOISES = 8, 4, 0.05, 3, 4, 6
+_MEDIAN_BEND = 1.65  # of the second differences of white noise, over its standard deviation
 # One or two values that no motion reaches: so many spans of eight of ten samples away from them, time and again, not in
 # the long runs of a pulse.
 _SPANS, _MOST_VALUES, _TENTH = 10.0, 2, 0.1
@@ -66,7 +67,8 @@ def _error_codes(x: Float, sd: float, steady: Mask) -> Mask:
     step = float(np.min(moves[moves > 0], initial=np.inf))
     if not np.isfinite(step):
         return far
-    limit = max(2 * _FAR * sd, _STEPS * step, 2 * float(np.nanmedian(moves)))
+    noise = float(np.nanmedian(np.abs(np.diff(x, 2)))) / _MEDIAN_BEND
+    limit = max(2 * _FAR * sd, _STEPS * step, 2 * float(np.nanmedian(moves)), _NOISES * noise)
     for run in range(1, _CODES + 1):
         first = np.arange(1, len(x) - run)
         inside = np.array([x[first + k] for k in range(run)])

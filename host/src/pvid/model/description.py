@@ -15,7 +15,7 @@ from pvid.model.compiled import CompiledModel, Extra, Known, Output, Refinement,
 from pvid.model.compiler import rows_of
 from pvid.model.eliminate import Equation
 from pvid.model.normal_form import rational
-from pvid.model.readable import latex
+from pvid.model.readable import latex, readable
 from pvid.model.refusal import ModelError, place_of_caller
 from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
 from pvid.model.typed import typed_expression
@@ -61,12 +61,20 @@ class Model:
     def _repr_latex_(self) -> str:
         return f"$\\displaystyle {latex(one.expression for one in self.equations)}$" if self.equations else ""
 
+    @property
+    def _kinds(self) -> dict[str, Sequence[Signal | Unknown | Known | Output]]:
+        return {"signal": self.signals, "unknown": self.unknowns, "known": self.knowns, "output": self.outputs}
+
+    def __repr__(self) -> str:
+        kinds = {kind: ", ".join(f"{one.name} [{one.unit or 1}]" for one in ones) for kind, ones in self._kinds.items()}
+        told = (f"    {kind}: {ones}" for kind, ones in kinds.items() if ones)
+        equations = (f"    {readable(one.expression)} = 0" for one in self.equations)
+        return "\n".join([f"Model({self.title!r})", *equations, *told])
+
     def _repr_html_(self) -> str:
-        kinds: dict[str, Sequence[Signal | Unknown | Known | Output]]
-        kinds = {"signal": self.signals, "unknown": self.unknowns, "known": self.knowns, "output": self.outputs}
         rows = "".join(
             f"<tr><td>{escape(one.name)}</td><td>{escape(one.unit)}</td><td>{kind}</td></tr>"
-            for kind, ones in kinds.items()
+            for kind, ones in self._kinds.items()
             for one in ones
         )
         return f"<p><strong>{escape(self.title)}</strong></p><p>{self._repr_latex_()}</p><table>{rows}</table>"
