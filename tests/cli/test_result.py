@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from own_mechanisms import OWN, own_recording
 from test_api import run as run  # the pendulum's
@@ -102,6 +103,21 @@ def test_words_and_tables_have_the_numbers_of_the_result(found: pvid.Result) -> 
         assert told.value in text and told.low in text and told.high in text
     assert found.summary().startswith("Heated plate: good.") and "predict" in found.summary()
     assert r"\mathrm{J/K}" in found._repr_latex_()
+
+
+def test_a_result_is_a_mapping_and_a_parameter_a_number(
+    found: pvid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert {**found} == found.parameters and len(found) == 2 and found.get("C") is found["C"] and found.get("x") is None
+    assert found != found.parameters and found in {found}
+    assert float(found["C"]) == found.params["C"] and f"{found['C']:.3g}" == f"{found.params['C']:.3g}"
+    assert f"{found['C']}" == str(found["C"])
+    monkeypatch.chdir(tmp_path)
+    assert str(found.report()) == "heated_plate.html" and str(found.plot()) == "heated_plate.png"
+    own = data()
+    for index in (own["t"], pd.to_timedelta(own["t"], unit="s")):  # without a name: the time
+        frame = pd.DataFrame({"T": own["T"], "P": own["P"]}, index=index)
+        assert pvid.identify(frame, model=PLATE)["C"].value == pytest.approx(found.params["C"], rel=1e-6)
 
 
 def test_a_result_is_saved_and_loaded(found: pvid.Result, tmp_path: Path) -> None:

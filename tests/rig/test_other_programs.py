@@ -274,6 +274,19 @@ class DataSet(dict[str, npt.NDArray[Any]]):
         return {"t": T}[name]
 
 
+class InUnits(np.ndarray[Any, np.dtype[Any]]):
+    """As a variable of such a set that states its unit."""
+
+    attrs = {"units": "mm"}
+
+
+class Lazy:
+    """As a frame of polars before its rows are computed."""
+
+    def collect(self) -> pandas.DataFrame:
+        return FRAME
+
+
 FRAME = pandas.DataFrame({"t": T, "F": F, "x": X})
 Row = namedtuple("Row", "t F x")
 AT = pandas.to_datetime("2024-05-02") + pandas.to_timedelta(np.arange(ROWS) * 2, "ms")
@@ -281,14 +294,17 @@ LEVELS = pandas.MultiIndex.from_tuples([("t", ""), ("rig", "F"), ("rig", "x")])
 UNITS = pandas.MultiIndex.from_tuples([("t", "s"), ("F", "N"), ("x", "m")])
 DATA: dict[str, tuple[Any, str | None]] = {
     "columns in levels": (FRAME.set_axis(LEVELS, axis=1), None),
-    "units as a level": (FRAME.set_axis(UNITS, axis=1), "t=t [s],F=F [N],x=x [m]"),
+    "units as a level": (FRAME.set_axis(UNITS, axis=1), None),
     "rows in levels": (FRAME.set_index(pandas.MultiIndex.from_arrays([["a"] * ROWS, T], names=["run", "t"])), None),
     "an index of times without a name": (FRAME[["F", "x"]].set_index(AT), None),
     "texts with decimal commas": (FRAME.assign(F=[f"{one:.3f}".replace(".", ",") for one in F]), None),
-    "a unit in the name": (pandas.DataFrame({"t_ms": T * 1000, "F": F, "x [mm]": X * 1000}), "t=t_ms,x=x [mm]"),
+    "a unit in the name": (pandas.DataFrame({"t_ms": T * 1000, "F": F, "x [mm]": X * 1000}), "t=t_ms"),
     "records": ([{"t": t, "F": f, "x": x} for t, f, x in zip(T, F, X, strict=True)], None),
     "named tuples": ([Row(*one) for one in zip(T, F, X, strict=True)], None),
     "a data set": (DataSet(F=F, x=X), None),
+    "a data set with units": (DataSet(F=F, x=(X * 1000).view(InUnits)), None),
+    "a lazy frame": (Lazy(), None),
+    "an index of numbers without a name": (FRAME[["F", "x"]].set_index(T), None),
     "names in bytes": ({b"t": T, b"F": F, b"x": X}, None),
     "milliseconds since 1970": ({"t": 1_714_640_400_000 + 2 * np.arange(ROWS), "F": F, "x": X}, None),
 }

@@ -562,6 +562,7 @@ def test_dates_that_can_be_read_in_two_ways_are_refused_past_midnight(tmp_path: 
             "x in mm",
         ),
         (["t,F,x [mm]"], "x=x [mm]", "x in mm"),
+        (["t [s],F (N),x [mm]"], None, "x in mm"),
         (["t,F,x (mm)"], "x=3", "x in mm"),
         (["time,force,place", "s,N,mm"], "t=1,F=2,x=3", "x in mm"),
         (["Source,CH1,CH2,,", "s,N,mm"], "t=1,F=2,x=3", "x in mm"),

@@ -36,9 +36,12 @@ def named(data: Any) -> dict[str, Any]:
     if isinstance(data, Sequence) and data and all(isinstance(one, Mapping) or hasattr(one, "_asdict") for one in data):
         rows = [one if isinstance(one, Mapping) else one._asdict() for one in data]
         return {name: [row.get(name) for row in rows] for name in dict.fromkeys(name for row in rows for name in row)}
+    if hasattr(data, "collect"):  # of polars, a frame whose rows are yet to be computed
+        data = data.collect()
     if hasattr(data, "data_vars"):  # of xarray, a mapping whose coordinates are no keys
-        names = [*data.coords, *data.data_vars]
-    elif isinstance(data, Mapping):
+        stated = [(one, getattr(data[one], "attrs", {}).get("units")) for one in (*data.coords, *data.data_vars)]
+        return {f"{one} [{unit}]" if unit and is_unit(str(unit)) else str(one): data[one] for one, unit in stated}
+    if isinstance(data, Mapping):
         names = [*data.keys()]
     else:
         found = getattr(data, "column_names", getattr(data, "columns", None))
@@ -53,7 +56,7 @@ def named(data: Any) -> dict[str, Any]:
         for level in getattr(index, "names", None) or ():
             if isinstance(level, str):
                 named.setdefault(level, index.get_level_values(level))
-        if getattr(getattr(index, "dtype", None), "kind", "") in "mM" and index.name is None:
+        if getattr(getattr(index, "dtype", None), "kind", " ") in "mMf" and index.name is None:
             named.setdefault("t", index)
     return named
 

@@ -67,6 +67,12 @@ class Parameter:
         _refuse_level(level)
         return interval_of(self.value, self.se, self.below, level)
 
+    def __float__(self) -> float:
+        return self.value
+
+    def __format__(self, spec: str) -> str:
+        return format(self.value, spec) if spec else str(self)
+
     def __str__(self) -> str:
         value, error = with_error(self.value, self.se)
         return f"{value} ± {error} {self.unit}".rstrip()
@@ -80,8 +86,8 @@ class Picture(type(Path())):  # type: ignore[misc]
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
-    """An identification.
+class Result(Mapping[str, Parameter]):
+    """An identification, a mapping of names to parameters.
 
     Attributes
     ----------
@@ -116,8 +122,10 @@ class Result:
             raise KeyError(self._why_without(name))
         return self.parameters[name]
 
-    def __contains__(self, name: object) -> bool:
-        return name in self.parameters
+    __eq__, __hash__ = object.__eq__, object.__hash__  # not those of a mapping
+
+    def __len__(self) -> int:
+        return len(self.parameters)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.parameters)
@@ -254,12 +262,13 @@ class Result:
             write_whole(out, json.dumps({**self.details, "saved": own | {"notes": list(self.notes)}}) + "\n")
         return out
 
-    def report(self, path: str | Path, *, force: bool = False) -> Path:
+    def report(self, path: str | Path | None = None, *, force: bool = False) -> Path:
         """Writes the report: one HTML page with the answer in words, measured against predicted motion that was not
         fitted, what is missing, the parts of the errors, and how it was made. Returns its path.
 
         Parameters
         ----------
+        path : None: MODEL.html in the present folder
         force : replace a file that pvid did not write, too
 
         Raises
@@ -267,7 +276,7 @@ class Result:
         PvidError
             When it cannot be written, there is such a file, or the result was loaded from a file.
         """
-        answer, out = self._identified_here("report"), Path(path)
+        answer, out = self._identified_here("report"), Path(path or f"{self._model.name}.html")
         with replacing(force):
             from pvid.show.report import write_report  # loads matplotlib
 
@@ -284,12 +293,13 @@ class Result:
 
         return predicted(self._model, recording, self.params, self.details.get("window_s"))
 
-    def plot(self, path: str | Path, *, force: bool = False) -> Path:
+    def plot(self, path: str | Path | None = None, *, force: bool = False) -> Path:
         """Writes a figure of the estimates over time, with the answer and its standard errors, and of the measured
         against the simulated signals (png, svg or pdf). Returns its path, which a notebook shows as a picture.
 
         Parameters
         ----------
+        path : None: MODEL.png in the present folder
         force : replace a file that pvid did not write, too
 
         Raises
@@ -297,7 +307,7 @@ class Result:
         PvidError
             When it cannot be written, or there is such a file.
         """
-        out = Picture(path)
+        out = Picture(path or f"{self._model.name}.png")
         with replacing(force):
             from pvid.show.answer_figure import write_figure
 

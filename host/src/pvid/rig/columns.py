@@ -247,8 +247,11 @@ class Columns:
                 )
             if times == 1:
                 places[signal] = names.index(name)
-            elif signal in self.named and name.isdecimal() and 1 <= int(name) <= len(names):
-                places[signal] = int(name) - 1
+            elif signal in self.named:
+                if name.isdecimal() and 1 <= int(name) <= len(names):
+                    places[signal] = int(name) - 1
+            elif len(with_unit := [k for k, one in enumerate(names) if self._is_with_unit(one, signal)]) == 1:
+                places[signal] = with_unit[0]
         missing = [signal for signal in self.units if signal not in places]
         if missing:
             units = self.units
@@ -263,6 +266,12 @@ class Columns:
                 tuple(names),
             )
         return places
+
+    def _is_with_unit(self, name: str, signal: str) -> bool:
+        """Whether a column is called as the signal, with a unit of its dimension in brackets: `x [mm]`."""
+        unit = unit_in_brackets(name)
+        stem = _IN_BRACKETS.sub("", name).strip()
+        return bool(unit) and stem == signal and scale_to(self.units[signal], spelled(unit)) is not None
 
     def _suggestion(self, names: Sequence[str], places: Mapping[str, int]) -> str:
         """The text for --columns that is likely to be meant; a signal whose column cannot be guessed is NAME."""
