@@ -16,6 +16,7 @@ from pendulum_plant import STANDARD_PENDULUM, Truth, simulate
 
 from pvid.board import sizes
 from pvid.cli.main import commands
+from pvid.cli.results import read_results
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, sources_of
 from pvid.rig.mechanism_file import MechanismRig
 
@@ -234,6 +235,14 @@ def test_the_costs_are_what_their_command_writes(tmp_path: Path, monkeypatch: py
     assert text_of(page).count("| 1 / 2 | 3") == 7
     CliRunner().invoke(commands, ["sizes", "--update", str(page)], standalone_mode=False, catch_exceptions=False)
     assert text_of(page) == text_of(FIRMWARE), "./tools/pvid sizes --update host/docs/firmware.md"
+
+
+def test_the_table_of_sizes_is_that_of_the_budget() -> None:
+    """Which tests/board/test_targets.py compares with what is measured."""
+    budget = sizes.budgeted(ROOT / "tests" / "budget.toml")
+    kept = read_results(ROOT / "host" / "docs" / "benchmarks" / "sizes.csv").rows
+    anew = "./tools/pvid sizes --budget tests/budget.toml --data host/docs/benchmarks, ./tools/pvid bench figures"
+    assert sorted(kept) == sorted(sizes.table_rows(budget)), anew
 
 
 def test_readme_is_short_and_begins_with_what_a_reader_runs() -> None:

@@ -15,6 +15,7 @@ import pvid
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.identification.analysis import analysed
+from pvid.identification.answer import Analysis
 from pvid.identification.judge import judged, with_unseen
 from pvid.identification.refinement.inputs import second_derivative_of
 from pvid.identification.road import identified
@@ -206,7 +207,9 @@ def process_of_one_step(seed: int, slow_noise: float) -> tuple[CompiledModel, Re
 @pytest.mark.parametrize("seed", range(2))
 def test_one_step_of_a_slow_process_gives_its_time_constant(seed: int) -> None:
     model, run = process_of_one_step(seed, 0.03)
-    T = identified(run, model).values["T"]
+    answer = identified(run, model)
+    assert isinstance(answer, Analysis) and len(answer.found.times) == len(answer.found.history)  # of other windows
+    T = answer.values["T"]
     assert T.value is not None and T.se is not None
     assert abs(T.value - 66.0) < min(3 * T.se, 0.2 * 66.0)  # windows of 5 s show 0.3 s
 

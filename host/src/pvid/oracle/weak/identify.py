@@ -60,7 +60,6 @@ class Identified:
     verdict : whether to trust it
     judged : whether the run determines it, of each parameter
     r2 : of each row kind
-    times : end of each window [s]
     design : of the windows
     equation_errors : of each row kind
     with_error : they were estimated
@@ -81,7 +80,6 @@ class Identified:
     verdict: Verdict
     judged: tuple[Judged, ...]
     r2: dict[str, float]
-    times: Float
     design: WeakDesign
     equation_errors: dict[str, EquationError]
     with_error: bool
@@ -122,6 +120,11 @@ class Identified:
         """The published standard errors but for gains, constants and what is missing [n_p]."""
         other = np.sum(self.gains**2, axis=0) + self.by_model**2
         return np.asarray(np.sqrt(np.maximum(self.se**2 - other, 0.0)))
+
+    @property
+    def times(self) -> Float:
+        """End of each window of the fit [s], which need not have those of the design."""
+        return self.fit.rows.end_times()
 
     @cached_property
     @np.errstate(all="ignore")
@@ -312,7 +315,6 @@ def _judged(
         verdict=Verdict(verdict.sorted_by_gravity(reasons)),
         judged=judged,
         r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},
-        times=fit.rows.end_times(),
         design=used,
         equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
         with_error=with_error,
