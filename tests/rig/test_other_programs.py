@@ -207,6 +207,9 @@ def octave(**matrices: npt.NDArray[Any]) -> str:
 RECORDS = [
     {"t": float(t), "rig": {"F": float(f)}, "x": float(x), "mode": "a" * (k % 3)} for k, (t, f, x) in enumerate(CELLS)
 ]
+NUMBERS = [[float(cell) for cell in row] for row in CELLS]
+FRAME = {name: {str(k): row[at] for k, row in enumerate(NUMBERS)} for at, name in enumerate("tFx")}
+SERIES = {"name": "run", "columns": [*"tFx"], "values": NUMBERS}
 FILES: dict[str, tuple[str, str | bytes, str | None]] = {
     "zip": ("a.zip", zipped({"Raw Data.csv": PLAIN, "meta/device.csv": "property,value\n"}), None),
     "zip with another name": ("a.csv", zipped({"run.csv": PLAIN}), None),
@@ -227,6 +230,31 @@ FILES: dict[str, tuple[str, str | bytes, str | None]] = {
         "".join(json.dumps({"ts": float(t), "name": name, "value": float(v)}) + "\n" for t, name, v in LONG),
         "t=ts",
     ),
+    "objects after each other": ("a.json", "".join(json.dumps(one, indent=2) for one in RECORDS), None),
+    "a frame of columns": ("a.json", json.dumps(FRAME), None),
+    "a frame of columns, index t": (
+        "a.json",
+        json.dumps({one: dict(zip(T.tolist(), FRAME[one].values(), strict=True)) for one in "Fx"}),
+        None,
+    ),
+    "a frame of rows": (
+        "a.json",
+        json.dumps({k: dict(zip("tFx", row, strict=True)) for k, row in enumerate(NUMBERS)}),
+        None,
+    ),
+    "a frame with its schema": (
+        "a.json",
+        json.dumps({"schema": {"fields": [{"name": one} for one in "tFx"]}, "data": RECORDS}),
+        None,
+    ),
+    "columns with their schema": (
+        "a.json",
+        json.dumps(
+            {"schema": {"fields": [{"name": one} for one in "tFx"]}, "data": {"values": [*zip(*NUMBERS, strict=True)]}}
+        ),
+        None,
+    ),
+    "an answer of a database": ("a.json", json.dumps({"results": [{"id": 0, "series": [SERIES]}]}), None),
     "Octave": ("a.txt", octave(t=T[:, None], F=F[:, None], x=X[None, :]), None),
     "a matrix of Octave": ("a.mat", octave(data=np.column_stack([T, F, X])), "t=1,F=2,x=3"),
 }
@@ -238,6 +266,21 @@ def test_other_kinds_of_files(case: str, tmp_path: Path) -> None:
     assert_same(read(tmp_path / name, content, text))
 
 
+@pytest.mark.parametrize("text", [json.dumps({"data": RECORDS}), json.dumps(RECORDS, indent=1), json.dumps(NUMBERS)])
+def test_json_that_lacks_its_end_is_read_up_to_there(text: str, tmp_path: Path) -> None:
+    run = read(tmp_path / "a.json", text[:-20], "t=1,F=2,x=3" if text.startswith("[[") else None)
+    assert "the file ends within a record, which is left out" in run.notes
+    np.testing.assert_array_equal(run.signals["x"], X[: len(run.t)])
+    assert len(run.t) >= len(T) - 1
+
+
+def test_lines_among_json_that_are_none_are_left_out(tmp_path: Path) -> None:
+    lines = [json.dumps(one) for one in RECORDS]
+    run = read(tmp_path / "a.jsonl", "\n".join(["boot 1.2", *lines, '{"t": 5.0, "ri']))
+    assert_same(run)
+    assert "left out, no JSON: 2 (first: 'boot 1.2')" in run.notes
+
+
 @pytest.mark.parametrize(
     ("name", "content", "part"),
     [
@@ -245,6 +288,7 @@ def test_other_kinds_of_files(case: str, tmp_path: Path) -> None:
         ("a.zip", b"PK\x03\x04 this is not", "not a whole zip file"),
         ("a.csv.xz", b"\xfd7zXZ\0 this is not", "not a whole xz file"),
         ("a.json", "{", "is no JSON"),
+        ("a.json", '{"t": [0, 1, 2, 3, 4, 5], "F": [0.1, 0.', "one column alone.*; the file ends within a record"),
         ("a.json", "[]", "has no list of records"),
         ("a.txt", octave(t=T[:, None]).replace("# rows: 2500", "# rows: 2501"), "'t' is not 2501 by 1 numbers"),
         ("a.log", "(1714640400.000001) can0 123#00FF12\n" * 9, "a candump log of CAN frames"),
