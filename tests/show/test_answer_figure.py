@@ -92,3 +92,5 @@ def test_numbers_at_an_axis_are_whole_and_apart() -> None:
     plain_ticks(axis)
     labels = [axis.yaxis.get_major_formatter()(value, 0) for value in (1.199995, 1.2, 1.200005)]
     assert len(set(labels)) == 3 and float(labels[0]) == pytest.approx(1.199995, abs=1e-9)
+    axis.set_ylim(-20_000, 20_000)
+    assert axis.yaxis.get_major_formatter()(-20_000.0, 0) == "-20000"

@@ -90,7 +90,8 @@ def command(
         seconds = len(made.playback.counts) / made.sample_rate
         write_stderr(
             f"note: the example replays the first {seconds:.3g} s of the recording and prints no estimate: "
-            f"{made.playback.held.text}. `pvid identify` says more; a longer or livelier recording helps"
+            f"{made.playback.held.text}. `pvid identify --core {core}` names the cause: too little motion, or a "
+            "parameter that may be 0, without which a model file of your own is answered"
         )
     write_stderr(f"{out}: {len(paths)} files; start with {out / 'README.md'}")
     return DONE

@@ -23,7 +23,7 @@ from pvid.base.figure_file import drawable, save
 from pvid.identification.answer import Analysis, Answer
 from pvid.identification.core import CoreAnswer
 from pvid.identification.core_refined import RefinedCoreAnswer
-from pvid.identification.summary import prefixed, printed_unit, shown
+from pvid.identification.summary import prefixed, printed_unit, shown, unit_for
 from pvid.identification.validation import Validation
 from pvid.log.history import envelope
 from pvid.model.compiled import CompiledModel
@@ -151,7 +151,7 @@ def settling(answer: Answer, place: Place) -> None:
     for k, (name, axis) in enumerate(zip(names, grid.T.flat, strict=False)):
         one = answer.values[name]
         told, interval = shown(one), one.interval()
-        unit, scale = prefixed(abs(one.value or 0.0), one.unit)
+        unit, scale = unit_for(abs(one.value or 0.0), one.unit)
         late: list[Float] = []
         for (t, history, label), color in zip(histories(answer), (VALUE, INK), strict=False):
             axis.plot(t, history[:, k] / scale, color=color, linewidth=1.2, label=label)
@@ -163,7 +163,7 @@ def settling(answer: Answer, place: Place) -> None:
             away = np.abs(np.concatenate([*late, [low, high]]) - one.value / scale)
             reach = 1.15 * max(float(np.nanmax(away)), high - low)
             axis.set_ylim(one.value / scale - reach, one.value / scale + reach)
-        axis.set_ylabel(f"{name} [{printed_unit(unit)}]" if unit else name)
+        axis.set_ylabel(f"{name} [{unit}]" if unit else name)
         _styled(axis)
     for axis in grid.T.flat[len(names) :]:
         axis.set_axis_off()
@@ -175,7 +175,7 @@ def settling(answer: Answer, place: Place) -> None:
 def histories(answer: Answer) -> list[tuple[Float, Float, str]]:
     """Times [n] and estimates [n, n_p] up to them, with their names; none where an identifier has none."""
     if isinstance(answer, Analysis):
-        return [(answer.found.times, answer.found.history, "data up to then")]
+        return [(answer.found.history_times, answer.found.history, "data up to then")]
     if isinstance(answer, CoreAnswer):
         return [(answer.publications.t, answer.publications.p, "in C, as it runs")]
     if isinstance(answer, RefinedCoreAnswer):

@@ -32,6 +32,7 @@ def plain_ticks(axis: Axes) -> None:
         low, high = axis.get_ylim()
         largest, span = max(abs(low), abs(high)), abs(high - low)
         digits = 3 + max(0, math.ceil(math.log10(largest / span))) if span > 0 else 6
-        return f"{0.0 if abs(value) < 1e-9 * span else value:.{digits}g}"
+        shown = f"{0.0 if abs(value) < 1e-9 * span else value:.{digits}g}"
+        return f"{value:.0f}" if "e+0" in shown else shown
 
     axis.yaxis.set_major_formatter(FuncFormatter(text))

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
+from pvid.identification.summary import unit_for
 from pvid.log.history import History
 from pvid.log.mechanism import LogMechanism
 from pvid.log.reader import LogReader
@@ -106,15 +107,17 @@ def _estimates(history: History, axes: Sequence[Axes], weak: str, *colors: str) 
     t = history.estimates("t")
     for one, axis in zip((*history.mechanism.parameters, *history.extras), axes, strict=False):
         limits = []
+        last = history.published.get(one.name, 0.0)
+        unit, scale = unit_for(abs(last) if math.isfinite(last) else 0.0, one.unit)
         if one not in history.extras:
-            of_weak = t, history.estimates(one.name), history.estimates(f"{one.name}_se")
+            of_weak = t, history.estimates(one.name) / scale, history.estimates(f"{one.name}_se") / scale
             limits += _curve(axis, *of_weak, colors[0], weak)
         if history.stage:
-            of_refined = history.refined("t"), history.refined(one.name), history.refined(f"{one.name}_se")
-            limits += _curve(axis, *of_refined, colors[1], "refined, published where drawn")
+            value, se = (history.refined(name) / scale for name in (one.name, f"{one.name}_se"))
+            limits += _curve(axis, history.refined("t"), value, se, colors[1], "refined, published where drawn")
         if limits:
             axis.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-        axis.set_ylabel(one.label)
+        axis.set_ylabel(f"{one.name} [{unit}]" if unit else one.name)
         plain_ticks(axis)
 
 

@@ -60,6 +60,7 @@ class Identified:
     verdict : whether to trust it
     judged : whether the run determines it, of each parameter
     r2 : of each row kind
+    times : end of each window [s]
     design : of the windows
     equation_errors : of each row kind
     with_error : they were estimated
@@ -80,6 +81,7 @@ class Identified:
     verdict: Verdict
     judged: tuple[Judged, ...]
     r2: dict[str, float]
+    times: Float
     design: WeakDesign
     equation_errors: dict[str, EquationError]
     with_error: bool
@@ -121,18 +123,18 @@ class Identified:
         other = np.sum(self.gains**2, axis=0) + self.by_model**2
         return np.asarray(np.sqrt(np.maximum(self.se**2 - other, 0.0)))
 
-    @property
-    def times(self) -> Float:
-        """End of each window of the fit [s], which need not have those of the design."""
-        return self.fit.rows.end_times()
-
     @cached_property
     @np.errstate(all="ignore")
     def history(self) -> Float:
-        """p after each window, from the windows up to it [windows, n_p]; NaN where the search ran away."""
+        """p after each window of the fit, from the windows up to it [n, n_p]; NaN where the search ran away."""
         if self.drifted is not None:
             return self.drifted.told_at(self.times)  # the last fit may leave out other windows
         return online(self.fit.rows, self.fit.start, self.with_error)
+
+    @property
+    def history_times(self) -> Float:
+        """Ends of these windows [n, s], which are not `times` where another fit than the usual is published."""
+        return self.times if self.drifted is not None else self.fit.rows.end_times()
 
 
 _SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
@@ -315,6 +317,7 @@ def _judged(
         verdict=Verdict(verdict.sorted_by_gravity(reasons)),
         judged=judged,
         r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},
+        times=fit.rows.end_times(),
         design=used,
         equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
         with_error=with_error,
