@@ -297,6 +297,9 @@ def test_lines_among_json_that_are_none_are_left_out(tmp_path: Path) -> None:
         ("a.log", "FMT, 128, 89, FMT, BBnNZ, Type,Length\nATT, 1, 2, 3\n", "mavlogdump.py --format csv"),
         ("a.txt", "2024-05-02 10:00:00.12: ATT {TimeUS : 1, Roll : 2.0}\n" * 9, "mavlogdump.py --format csv"),
         ("a.txt", "<table><tr><td>1</td><td>2</td></tr></table>\n", "a page of HTML"),
+        ("a.txt", '<?xml version="1.0"?>\n<data/>\n', "is XML"),
+        ("a.db", b"SQLite format 3\0" + bytes(range(32, 127)) * 9, "is a database: `sqlite3"),
+        ("a.vcd", "$date today $end\n$timescale 1ns $end\n", "a dump of value changes"),
     ],
 )
 def test_what_is_no_table_is_named(name: str, content: str | bytes, part: str, tmp_path: Path) -> None:

@@ -286,6 +286,45 @@ def test_files_of_hdf5(case: str, suffix: str, tmp_path: Path) -> None:
     assert_same(read_recording(path, None, columns(text)))
 
 
+@pytest.mark.parametrize("version", [1, 4])
+def test_files_of_netcdf_with_what_is_packed(version: int, tmp_path: Path) -> None:
+    """In integers of a step and an offset; times since a date."""
+    path, count = tmp_path / "run.nc", np.round(T * 1000.0).astype(np.int32)
+    step = 1e-5
+    packed = np.round((X - 0.01) / step).astype(np.int32)
+    gone = np.where(np.arange(len(X)) == 40, -99, packed).astype(np.int32)
+    stated = {
+        "units": "m",
+        "scale_factor": np.float64(step),
+        "add_offset": np.float64(0.01),
+        "_FillValue": np.int32(-99),
+    }
+    kept: dict[str, tuple[npt.NDArray[Any], dict[str, Any]]] = {
+        "t": (count, {"units": "ms since 2024-05-02"}),
+        "F": (F, {"units": "N"}),
+        "x": (gone, stated),
+    }
+    if version == 4:
+        with h5py.File(path, "w") as file:
+            for name, (data, attributes) in kept.items():
+                file[name] = data
+                file[name].attrs.update(attributes)
+    else:
+        with scipy.io.netcdf_file(path, "w") as file:
+            file.createDimension("row", len(T))
+            for name, (data, attributes) in kept.items():
+                variable = file.createVariable(name, data.dtype, ("row",))
+                variable[:] = data
+                for one, value in attributes.items():
+                    setattr(variable, one, value)
+    found = read_recording(path, None, columns())
+    np.testing.assert_allclose(found.t, count / 1000.0, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(found.signals["F"], F)
+    there = np.arange(len(X)) != 40
+    np.testing.assert_allclose(found.signals["x"][there], packed[there] * step + 0.01, rtol=1e-12)
+    assert abs(found.signals["x"][40] - X[40]) < 1e-3
+
+
 def written_mcap(path: Path, topics: Mapping[str, list[tuple[int, dict[str, Any]]]]) -> None:
     with path.open("wb") as file:
         writer = Writer(file)
@@ -389,6 +428,8 @@ def test_damaged_files_are_one_sentence(name: str, tmp_path: Path) -> None:
         ("a.7z", "unpack"),
         ("a.xls", "save it as .xlsx"),
         ("a.mf4", "asammdf"),
+        ("a.wav", "wavfile"),
+        ("a.pickle", "to_parquet"),
         ("a.dwg", "must end in"),
     ],
 )
@@ -411,6 +452,7 @@ def test_text_with_another_suffix_is_read(tmp_path: Path) -> None:
     [
         ("a.xlsx", "openpyxl", "openpyxl"),
         ("a.h5", "h5py", "h5py"),
+        ("a.nc", "h5py", "h5py"),
         ("a.mcap", "mcap.reader", "mcap"),
         ("a.parquet", "pyarrow.parquet", "pyarrow"),
     ],

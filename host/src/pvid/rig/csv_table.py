@@ -62,6 +62,9 @@ _NO_TABLES = {
         "the messages of one type as CSV"
     ),
     re.compile(rb"\s*(?:<!DOCTYPE html|<html|<table)", re.I): "a page of HTML: save its table as CSV",
+    re.compile(rb"\s*<\?xml"): "XML: save its records as CSV",
+    re.compile(rb"SQLite format 3"): "a database: `sqlite3 -header -csv RUN.db 'select * from TABLE' > RUN.csv`",
+    re.compile(rb"\s*\$(?:date|version|timescale|comment)\b"): "a dump of value changes (VCD): export it as CSV",
 }
 
 _NO_DATA = re.compile(rb"(?m)^[ \t]*(?:[#%]|//|sep=)")

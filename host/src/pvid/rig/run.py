@@ -43,7 +43,7 @@ from pvid.rig.octave_table import is_octave, read_octave
 from pvid.rig.stamps import in_seconds
 from pvid.rig.table import Table, called, row_place
 from pvid.rig.text_lines import is_text
-from pvid.rig.tree_table import read_hdf5, read_matlab
+from pvid.rig.tree_table import read_hdf5, read_matlab, read_netcdf
 from pvid.rig.turns import counted_on, joined
 
 FloatArray = npt.NDArray[np.float64]
@@ -387,6 +387,7 @@ _READERS: dict[str, Callable[[Path, Columns], Table]] = {
     **dict.fromkeys((".json", ".jsonl", ".ndjson"), read_json),
     ".mat": read_matlab,
     **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
+    ".nc": read_netcdf,
     **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
     ".mcap": read_mcap,
 }
@@ -404,7 +405,9 @@ _CONVERTED = {
     ".xls": "save it as .xlsx",
     ".ods": "save it as .xlsx",
     ".npy": "numpy.savez('RUN.npz', t=..., and an array for each signal)",
-    ".pkl": "write the data frame with to_parquet or to_csv",
+    **dict.fromkeys((".pkl", ".pickle"), "write the data frame with to_parquet or to_csv"),
+    ".wav": "sound: `scipy.io.wavfile.read(RUN)` has the rate and the samples; write them with a column of times",
+    ".raw": "LTspice: export the traces as text",
     ".tar": "unpack it",
     ".7z": "unpack it",
 }

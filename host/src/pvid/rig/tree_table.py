@@ -1,4 +1,4 @@
-"""Files that hold arrays in folders or structures: MATLAB (.mat) and HDF5 (.h5).
+"""Files that hold arrays in folders or structures: MATLAB (.mat), HDF5 (.h5) and netCDF (.nc), which is HDF5 since 4.
 
 An array is named by its path, `run.signals.x`, or by the last part of it where no other array has the same. A matrix
 has a column each: `data[1]`, `data[2]`, ..., as MATLAB counts.
@@ -24,6 +24,8 @@ from pvid.rig.table import Table
 
 Array = npt.NDArray[Any]
 
+_UNIT = ("units", "unit")
+_PACKED = ("_FillValue", "scale_factor", "add_offset")
 _MOST_COLUMNS = 64  # of a matrix; more are pictures or spectra
 
 
@@ -62,11 +64,9 @@ def read_hdf5(path: Path, columns: Columns) -> Table:
                     return
                 refuse_beyond(path, max(item.shape, default=0))
                 name = name.replace("/", ".")
-                unit = item.attrs.get("units", item.attrs.get("unit", ""))
-                for column, array in _of_structure(name, item[()]):
-                    arrays[column] = array
-                    if isinstance(unit, str | bytes) and unit:
-                        units[column] = unit.decode(errors="replace") if isinstance(unit, bytes) else unit
+                unit = _unit_of(item.attrs)
+                for column, array in _of_structure(name, _unpacked(item[()], item.attrs)):
+                    arrays[column], units[column] = array, unit
 
             file.visititems(visit)
     except PvidError:
@@ -74,6 +74,49 @@ def read_hdf5(path: Path, columns: Columns) -> Table:
     except Exception as error:  # h5py raises many kinds on damaged files
         raise PvidError(f"{path} is not a readable HDF5 file: {reason(error)}.") from error
     return _table(path, arrays, columns, units)
+
+
+def read_netcdf(path: Path, columns: Columns) -> Table:
+    """Reads the variables of a file of any version; PvidError for whatever is wrong with it."""
+    import scipy.io
+
+    with path.open("rb") as file:
+        if file.read(3) != b"CDF":
+            return read_hdf5(path, columns)
+    arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    try:
+        with scipy.io.netcdf_file(path, mmap=False) as file:
+            for name, item in file.variables.items():
+                refuse_beyond(path, max(item.shape, default=0))
+                attributes = {one: getattr(item, one) for one in (*_UNIT, *_PACKED) if hasattr(item, one)}
+                for column, array in _of_structure(name, _unpacked(item[:], attributes)):
+                    arrays[column], units[column] = array, _unit_of(attributes)
+    except PvidError:
+        raise
+    except Exception as error:  # as above
+        raise PvidError(f"{path} is not a readable netCDF file: {reason(error)}.") from error
+    return _table(path, arrays, columns, units)
+
+
+def _unit_of(attributes: Mapping[str, Any]) -> str:
+    """The unit that the attributes of an array state, as `ms` of `ms since 2024-05-02`; else an empty text."""
+    for name in _UNIT:
+        unit = attributes.get(name)
+        if isinstance(unit, str | bytes):
+            return (unit.decode(errors="replace") if isinstance(unit, bytes) else unit).partition(" since ")[0]
+    return ""
+
+
+def _unpacked(value: Any, attributes: Mapping[str, Any]) -> Any:
+    """An array in its unit where its attributes state that it is kept in integers, one of them missing;
+    the conventions for climate and forecast (CF), section 8.1."""
+    missing, factor, offset = (attributes.get(name) for name in _PACKED)
+    if factor is None and offset is None and (missing is None or np.asarray(value).dtype.kind not in "iuf"):
+        return value
+    gone = False if missing is None else np.asarray(value) == missing
+    scaled = np.asarray(value) * (1.0 if factor is None else factor) + (0.0 if offset is None else offset)
+    return np.where(gone, np.nan, scaled)
 
 
 def _of_structure(name: str, value: Any) -> Iterator[tuple[str, Array]]:
@@ -114,5 +157,5 @@ def _table(path: Path, arrays: dict[str, Array], columns: Columns, units: dict[s
         for name in arrays
     }
     names.update({one: found[0] for one, found in ends.items() if len(found) == 1})
-    stated = {shown: units[name] for shown, name in names.items() if name in units}
+    stated = {shown: units[name] for shown, name in names.items() if units.get(name)}
     return table_of(path, list(names), lambda name: arrays[names[name]], columns, stated)
