@@ -48,7 +48,8 @@ def fitted(noise: float, seed: int, design: WeakDesign) -> Fit:
 
 
 def alarms(fit: Fit) -> list[verdict.Reason]:
-    return verdict.of_attenuation(MODEL, fit, uncertainty(fit), other_line(fit))
+    found = uncertainty(fit)
+    return verdict.of_attenuation(MODEL, fit, found, other_line(fit), found.se)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -91,3 +92,16 @@ def test_rows_whose_known_side_is_the_highest_derivative_have_no_other_line() ->
     t = np.arange(2000) / RATE
     q = np.pi + 0.5 * np.exp(-0.02 * t) * np.cos(8.0 * t)
     assert other_line(batch(WeakRows.of(ready(model), {"q": q}, NARROW))) is None
+
+
+def test_disagreement_within_the_published_error_is_a_note() -> None:
+    """What is smaller than the error that it is a part of is no alarm: two estimates 0.3 % apart, with a gain's 2 %."""
+    parameters = ready(MODEL).parameters
+    one = np.array([parameters.guess[k] for k in range(len(MODEL.p))])
+    other, clash = 1.003 * one, np.full(len(one), 5.0)
+
+    def alarms(covered: float) -> list[bool]:
+        found = verdict.disagreement("windows", MODEL, parameters, one, other, clash, "{names} {one}", covered * one)
+        return [reason.alarm for reason in found]
+
+    assert alarms(0.02) == [False] and alarms(0.002) == [True] and alarms(0.0) == [True]

@@ -276,7 +276,7 @@ def _judged(
     named: Explained | None = None
     lacking = None if fit.diverged else attempt("what is missing", lambda: Missing.of(library, se))
     if not fit.diverged:
-        reasons += attempt.reasons(_checks(rows, run, own, halves, judged, with_error))
+        reasons += attempt.reasons(_checks(rows, run, own, halves, judged, with_error, se))
         if (
             lacking is not None
             and (lacking.visible.any() or lacking.is_large)
@@ -378,6 +378,7 @@ def _checks(
     halves: Halves | None,
     judged: Sequence[Judged],
     equation_error: bool,
+    se: Float,
 ) -> dict[str, Callable[[], list[Reason]]]:
     """Every check of an estimate, by what it looks at."""
     fit, found = own.fit, own.found
@@ -386,13 +387,13 @@ def _checks(
 
     def compared(judge: Callable[..., list[Reason]], fitted: Callable[[], Fit | None]) -> list[Reason]:
         other = None if work.is_spent() else fitted()  # no fit is compared with one that was ended
-        return [] if other is None else judge(bare, fit, found, other, uncertainty(other))
+        return [] if other is None else judge(bare, fit, found, other, uncertainty(other), se)
 
     return {
         "the search": lambda: verdict.settled(fit),
         "the samples": lambda: of_samples(bare, run, design.sample_rate, fit, min(found.r2)),
         "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
-        "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
+        "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit), se),
         "feedback": lambda: of_feedback(bare, run, fit, own.known),
         "the residuals": lambda: verdict.of_residuals(bare, found),
         "the range": lambda: verdict.of_range(bare, fit.p, judged),

@@ -391,12 +391,21 @@ def halves_of(fit: Fit) -> Halves | None:
 
 
 def disagreement(
-    name: Name, model: CompiledModel, parameters: Parameters, one: Float, other: Float, clash: Float, text: str
+    name: Name,
+    model: CompiledModel,
+    parameters: Parameters,
+    one: Float,
+    other: Float,
+    clash: Float,
+    text: str,
+    covered: Float | float = 0.0,
 ) -> list[Reason]:
-    """Two estimates [n_p] that are `clash` [n_p] standard errors apart disagree.
+    """Two estimates [n_p] that are `clash` [n_p] standard errors apart disagree: a note where they are no further apart
+    than what is covered.
 
     Parameters
     ----------
+    covered : published standard errors [n_p]
     text : of the sentence, with {names} of the parameters in question, and of the first one {name}, {one} and {other}
     """
     size = np.where(parameters.positive, np.maximum(np.abs(one), np.abs(other)), parameters.sd)
@@ -407,7 +416,8 @@ def disagreement(
     names = listed(model.p_names[bad] for bad in apart)
     values = [with_unit(value, model.unknowns[k].unit, 4) for value in (one[k], other[k])]
     shown = text.format(names=names, name=model.p_names[k], one=values[0], other=values[1])
-    return [Reason(name, shown, of=of_some(model, [int(bad) for bad in apart]))]
+    alarm = bool(np.any((np.abs(one - other) > covered)[apart]))
+    return [Reason(name, shown, alarm, of_some(model, [int(bad) for bad in apart]))]
 
 
 def of_halves(model: CompiledModel, fit: Fit, halves: Halves | None) -> list[Reason]:
@@ -421,35 +431,46 @@ def of_halves(model: CompiledModel, fit: Fit, halves: Halves | None) -> list[Rea
     return disagreement("halves", model, fit.parameters, halves.first, halves.second, halves.clash, text)
 
 
-def of_windows(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+def of_windows(
+    model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty, se: Float
+) -> list[Reason]:
     """Two lengths of window disagree."""
     lengths = [one.rows.functions.length for one in (fit, other)]
     text = (
         f"Windows of {lengths[0]:.3g} s and {lengths[1]:.3g} s disagree on {{names}} ({{name}}: {{one}} and "
         "{other}): noise in the regressors or a missing term biases the estimate."
     )
-    return _of_same_samples("windows", model, fit, found, other, of_other, text)
+    return _of_same_samples("windows", model, fit, found, other, of_other, text, se)
 
 
-def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+def of_smoothing(
+    model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty, se: Float
+) -> list[Reason]:
     """Two lengths of the filter that gives derivatives disagree: one blurs the motion, which no residual shows."""
     taps = [one.rows.record.grid.design.rate_taps for one in (fit, other)]
     text = (
         f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {{names}} ({{name}}: {{one}} and "
         "{other}): the longer filter attenuates the motion, or the shorter one passes too much noise."
     )
-    return _of_same_samples("smoothing", model, fit, found, other, of_other, text)
+    return _of_same_samples("smoothing", model, fit, found, other, of_other, text, se)
 
 
 def _of_same_samples(
-    name: Name, model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty, text: str
+    name: Name,
+    model: CompiledModel,
+    fit: Fit,
+    found: Uncertainty,
+    other: Fit,
+    of_other: Uncertainty,
+    text: str,
+    se: Float,
 ) -> list[Reason]:
     """Two estimates from the same samples disagree: the larger error bounds that of the difference."""
     clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
-    return disagreement(name, model, fit.parameters, fit.p, other.p, clash, text)
+    return disagreement(name, model, fit.parameters, fit.p, other.p, clash, text, se)
 
 
-def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Float | None) -> list[Reason]:
+def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Float | None, se: Float) -> list[Reason]:
     """The same rows with the highest derivative as the dependent signal disagree."""
     if other is None:
         return []
@@ -457,16 +478,19 @@ def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fl
         "Motion that the equations do not explain biases {names} ({name} is {one}, and {other} with the highest "
         "derivative as the dependent signal): excite more strongly, or take longer windows and fewer functions."
     )
-    return disagreement("attenuation", model, fit.parameters, fit.p, other, np.abs(fit.p - other) / found.se, text)
+    clash = np.abs(fit.p - other) / found.se
+    return disagreement("attenuation", model, fit.parameters, fit.p, other, clash, text, se)
 
 
-def of_weights(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+def of_weights(
+    model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty, se: Float
+) -> list[Reason]:
     """The same rows, weighted by the sensors' noise alone, disagree: a note, as no residual tells which is right."""
     text = (
         "With the weights of the sensors alone (--weights sensors) {names} would differ ({name}: {other} in place of "
         "{one}): use the values that predict another run of this mechanism better."
     )
-    reasons = _of_same_samples("weights", model, fit, found, other, of_other, text)
+    reasons = _of_same_samples("weights", model, fit, found, other, of_other, text, se)
     return [replace(one, alarm=False) for one in reasons]
 
 
