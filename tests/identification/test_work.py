@@ -21,7 +21,7 @@ from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import allowance_of, ready, start_of
 from pvid.oracle.weak.rows import WeakRows, WhiteRows
 from pvid.rig.run import Recording
-from pvid.sim.simulated_run import simulation_of
+from pvid.sim.simulated_run import RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
 Run = Mapping[str, Float]
@@ -88,6 +88,14 @@ def test_what_nothing_fits_ends_with_the_right_advice(bad: Callable[[Run], Run],
 def test_a_good_run_does_a_part_of_the_work_that_is_allowed() -> None:
     units, answer = units_of(RUN)
     assert not answer.advice and not answer.found.ranking[0].is_hopeless and units < 0.4 * allowed(RUN)
+
+
+def test_a_friction_that_is_0_is_no_bad_run() -> None:
+    """2073 units of work, before what is surely 0 was told from what a search has lost."""
+    rig = replace(MOTOR.rig, truth={**MOTOR.rig.truth, "Tc": 0.0})
+    units, answer = units_of(RigSimulation.of(MOTOR.model, rig).run(3))
+    assert answer.values["Tc"].status == "near_zero" and answer.identified and not answer.advice
+    assert units < 3 * units_of(RUN)[0]
 
 
 def test_a_good_run_whitens_its_rows_a_counted_number_of_times(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.together import with_own
 from pvid.oracle.weak import work
-from pvid.oracle.weak.choice import Scored, score_of
+from pvid.oracle.weak.choice import NOISE, Scored, score_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
@@ -84,7 +84,9 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
         return of_time
     if answer.recording.origins and answer.found.chi2 > _DIFFER and (own := _of_own(answer)) is not None:
         return (own,)
-    near = _distance(answer, answer.found.p, answer.found.se).least < _FAR and not _is_beyond_equations(answer)
+    near = _distance(
+        answer, answer.found.p, answer.found.se, answer.found.chi2
+    ).least < _FAR and not _is_beyond_equations(answer)
     if answer.identified and answer.found.chi2 < _MISFIT and near:
         return ()
     run = answer.recording.run
@@ -94,10 +96,10 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
             shown = with_unit(value, one.unit, 3) if value else "0"
             return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
     with work.limited(_OF_ANALYSIS * answer.found.allowance):
-        found = list(_tried(answer)) or list(_turned(answer))
-    least = min((one.left for one in found), default=0.0)
+        mistakes = list(_tried(answer)) or list(_turned(answer))
+    least = min((one.left for one in mistakes), default=0.0)
     # A linear mechanism moves alike in any unit, and with the other sign of its input and of its sensor.
-    alike = [one for one in found if one.left <= _ALIKE * least]
+    alike = [one for one in mistakes if one.left <= _ALIKE * least]
     nearest = min((one.distance for one in alike), default=0.0)
     alike = [one for one in alike if one.distance <= _ALIKE * nearest][:2]
     if not alike:
@@ -111,7 +113,7 @@ def _unit_of_time(answer: Analysis) -> str | None:
 
     Residuals contain nothing of it: another unit of time gives a linear mechanism other parameters and the same motion.
     """
-    if _distance(answer, answer.found.p, answer.found.se).least < _FAR:
+    if _distance(answer, answer.found.p, answer.found.se, answer.found.chi2).least < _FAR:
         return None
     design = answer.found.design
     low, high = _DOUBTFUL_RATES
@@ -121,7 +123,7 @@ def _unit_of_time(answer: Analysis) -> str | None:
         scale = _scale(answer, "t", unit)
         other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
         one = _score(answer, design=other)
-        if one is not None and one.known and _distance(answer, one.p, one.error).most < _NEAR:
+        if one is not None and one.known and _distance(answer, one.p, one.error, one.chi2).most < _NEAR:
             return unit
     return None
 
@@ -139,20 +141,23 @@ def _named(unit: str) -> str:
 
 class _Factors(NamedTuple):
     """The largest factor between a positive parameter and its guess: that of the values that two standard errors
-    allow which is nearest to the guess, of the values themselves, and that of the farthest."""
+    allow which is nearest to the guess, of the values themselves, and that of the farthest. One that may be 0
+    beside others is at no distance where the sensors explain the residuals."""
 
     least: float
     own: float
     most: float
 
 
-def _distance(answer: Analysis, p: Float, se: Float) -> _Factors:
+def _distance(answer: Analysis, p: Float, se: Float, chi2: float) -> _Factors:
     positive, guess = np.array([(one.positive, one.guess) for one in answer.model.unknowns]).T
     se = np.where(np.isnan(se), 0.0, se)
     ends = p - 2 * se, p + 2 * se
+    sized = (positive > 0) & (ends[0] > 0)
+    compared = sized if chi2 < NOISE and sized.any() else positive > 0
 
     def largest(*tried: Float) -> float:
-        ratios = (np.array(tried) / guess)[:, positive > 0]
+        ratios = (np.array(tried) / guess)[:, compared]
         return float(np.max(np.where(ratios > 0, np.maximum(ratios, 1 / ratios), np.inf), initial=1.0))
 
     return _Factors(largest(np.clip(guess, *ends)), largest(p), largest(*ends))
@@ -174,7 +179,7 @@ def _turned(answer: Analysis) -> Iterator[_Mistake]:
             again = attempted(partial(analysed, turned, answer.model, answer.weights))
             if again is None or not again.identified:
                 continue
-            if (factors := _distance(again, again.found.p, again.found.se)).most > _NEAR:
+            if (factors := _distance(again, again.found.p, again.found.se, again.found.chi2)).most > _NEAR:
                 continue
             if min(again.found.r2.values()) > _EXPLAINS:
                 said, unit, _ = next(_mistakes(signal, signals[signal.name]))
@@ -184,7 +189,11 @@ def _turned(answer: Analysis) -> Iterator[_Mistake]:
 def _tried(answer: Analysis) -> Iterator[_Mistake]:
     """Mistakes that explain the run."""
     model, signals, before = answer.model, answer.recording.run, _score(answer)
-    far = before is None or _distance(answer, before.p, before.error).least > _FAR or _is_beyond_equations(answer)
+    far = (
+        before is None
+        or _distance(answer, before.p, before.error, before.chi2).least > _FAR
+        or _is_beyond_equations(answer)
+    )
     for names, said, unit, most in _every_mistake(answer):
         typed = ",".join(f"{name}={name}:{unit}" for name in names)
         scale = _scale(answer, names[0], unit)
@@ -192,7 +201,7 @@ def _tried(answer: Analysis) -> Iterator[_Mistake]:
         scaled = model if abs(scale) == 1 else _with_noise(model, names, abs(scale))
         other = {**signals, **{name: scale * signals[name] for name in names}}
         one = _score(answer, scaled, other)
-        if one is None or not one.known or (factors := _distance(answer, one.p, one.error)).most > _NEAR:
+        if one is None or not one.known or (factors := _distance(answer, one.p, one.error, one.chi2)).most > _NEAR:
             continue
         left = one.chi2 / before.chi2 if before is not None else 0.0
         implausible = far or (scale < 0 and before is not None and not before.known)

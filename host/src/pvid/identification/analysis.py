@@ -63,11 +63,16 @@ def _determined(found: Identified) -> int:
 
 
 def _collapsed(model: CompiledModel, found: Identified) -> bool:
-    """Whether an unknown of a homogeneous row has shrunk to nothing."""
-    homogeneous = {str(one) for row in model.rows if not row.known for theta in row.theta for one in theta.free_symbols}
-    guesses = {one.name: one.guess for one in model.unknowns if one.positive and one.name in homogeneous}
-    names = (name if name in guesses else name.partition("[")[0] for name in found.names)  # m of m[A], too
-    return any(p < _NOTHING * guesses.get(name, -np.inf) for name, p in zip(names, found.p, strict=True))
+    """Whether unknowns of a homogeneous row have shrunk to nothing together, or beside one that is not determined.
+
+    A friction of the row that is 0 shrinks alone, and all others are determined.
+    """
+    rows = [{str(one) for theta in row.theta for one in theta.free_symbols} for row in model.rows if not row.known]
+    guesses = {one.name: one.guess for one in model.unknowns if one.positive}
+    names = [name if name in guesses else name.partition("[")[0] for name in found.names]  # m of m[A], too
+    shrunk = {name for name, p in zip(names, found.p, strict=True) if p < _NOTHING * guesses.get(name, -np.inf)}
+    sure = {name for name, one in zip(names, found.judged, strict=True) if one.status == "identified"} - shrunk
+    return any(row & shrunk and not (row & sure and sure | shrunk >= {*names}) for row in rows)
 
 
 def _of_edges(model: CompiledModel) -> Iterator[str]:

@@ -48,8 +48,8 @@ _ALIKE = 1.05
 # sixteen simulated runs, 2.5 where an encoder moves by few steps.
 _JOINT = 1.5
 
-# Above this the equations' own errors are estimated when designs are compared.
-MODEL_ERROR = 5.0
+# chi^2 that is the sensors'; above which the equations' own errors are estimated when designs are compared.
+NOISE, MODEL_ERROR = 2.0, 5.0
 
 # Of a parameter, to which it has fallen where it may be 0; and its standard error where it is sure.
 _NONE, _SURE = 0.01, 0.3
@@ -58,6 +58,7 @@ _NONE, _SURE = 0.01, 0.3
 # smoothing and the number of functions trade, noise against motion, is not what is wrong. In nine recordings of real
 # machines that have an answer the best length of window explains 0.78 and more of each row.
 _NOTHING = 0.2
+_SURELY_0 = 0.01  # standard error over the guess of a parameter that may be 0, where the sensors explain what is left
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,8 @@ class Scored:
 
     error : predicted, of each parameter [n_p]
     known : every parameter has a value that means something, within the range of the model, or may be 0
-    near_0 : one of them may be 0
+    near_0 : one of them may be 0, and the search for it may have lost its way: not few of them are near 0, or what is
+        left is no noise, or errors are a part of the guess
     r2 : of the row kind that is explained least
     """
 
@@ -156,7 +158,10 @@ def _scored(
         return None
     p = np.where(small, np.maximum(fit.p, ALMOST_0 * of_small), fit.p)
     score = float(np.exp(np.mean(np.log(relative))))
-    return Scored(design, score, p, found.chi2, relative * size, own.known, bool(small.any()), min(found.r2))
+    few = own.known and 2 * np.count_nonzero(small) < np.count_nonzero(fit.parameters.positive)
+    sure = few and found.chi2 < NOISE and bool(np.all(relative[small] < _SURELY_0))
+    near_0 = bool(small.any()) and not sure
+    return Scored(design, score, p, found.chi2, relative * size, own.known, near_0, min(found.r2))
 
 
 def power_of(model: Compiled) -> int:

@@ -16,7 +16,7 @@ from pvid.oracle.weak import shared, verdict, work
 from pvid.oracle.weak.assessment import Assessed, assessed, estimated_near_zero
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import shift_of
-from pvid.oracle.weak.choice import Scored, basis_of, ranked
+from pvid.oracle.weak.choice import NOISE, Scored, basis_of, ranked
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.drift import with_drift
 from pvid.oracle.weak.edges import other_side
@@ -26,7 +26,7 @@ from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.library import Library
-from pvid.oracle.weak.missing import MOST, NOISE, Explained, Missing, explained
+from pvid.oracle.weak.missing import MOST, Explained, Missing, explained
 from pvid.oracle.weak.naming import of_missing, of_unexplained
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows, record_of
 from pvid.oracle.weak.rows import ready as ready

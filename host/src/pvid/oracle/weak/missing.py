@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.oracle.weak import work
+from pvid.oracle.weak.choice import NOISE
 from pvid.oracle.weak.errors import chi2_of_sensors, inflation, uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.library import Library
@@ -64,7 +65,7 @@ _ALIKE = 0.5
 _EQUAL, _BY_LUCK = 0.9999, 4.0  # of the best gain: the same column; what a gain is less or more by chance
 _MOST_RIVALS = 5
 _STAND_IN = 1.5  # times the chi^2 that is left with a term: without it no more is left, as it stood in for a later one
-NOISE, _NOTICED = 2.0, 1.5  # chi^2 that is the sensors'; from which a term that explains much is looked for
+_NOTICED = 1.5  # chi^2 from which a term that explains much is looked for
 # Of the residuals beyond it: a law that imitates the missing one explains half to nine tenths of them.
 _ALL, MOST = 0.95, 0.9
 _ROUNDS = 6  # of a size
