@@ -132,6 +132,7 @@ def test_a_result_is_saved_and_loaded(found: pvid.Result, tmp_path: Path) -> Non
         again = pvid.load(path, model=model)
         assert again.parameters == found.parameters and np.array_equal(again.covariance, found.covariance)
         assert again.details == found.details and again.notes == found.notes and str(again) == str(found)
+        assert again.summary() == found.summary()
         assert again.validate(data()).sensors == found.validate(data()).sensors
     with pytest.raises(PvidError, match="a result from a file has no report: they need the recording"):
         again.report(tmp_path / "a.html")

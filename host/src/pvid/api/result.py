@@ -115,6 +115,7 @@ class Result(Mapping[str, Parameter]):
     _answer: Answer | None = None
     _made: Made = Made("")
     _columns: str | None = None
+    _words: str = ""  # of a result from a file
 
     def __getitem__(self, name: str) -> Parameter:
         """Raises KeyError with the reason where the run does not determine this parameter."""
@@ -217,9 +218,9 @@ class Result(Mapping[str, Parameter]):
         Raises
         ------
         PvidError
-            Where the result was loaded from a file.
+            Where the result was loaded from a file of a version before 0.4.
         """
-        return in_python(summary(self._identified_here("words")))
+        return self._words or in_python(summary(self._identified_here("words")))
 
     def to_frame(self) -> Any:
         """A data frame (pandas) with a row for each parameter: value, se, low and high of the 95 % interval, unit,
@@ -255,11 +256,16 @@ class Result(Mapping[str, Parameter]):
         PvidError
             When it cannot be written, or there is such a file.
         """
-        own = {"covariance": self.covariance.tolist(), "names": list(self.parameters), "rig": self._made.settings}
-        own["columns"] = self._columns
+        own: dict[str, Any] = {"covariance": self.covariance.tolist(), "names": list(self.parameters)}
+        own |= {
+            "rig": self._made.settings,
+            "columns": self._columns,
+            "words": self.summary(),
+            "notes": list(self.notes),
+        }
         out = Path(path)
         with replacing(force), _writing(out):
-            write_whole(out, json.dumps({**self.details, "saved": own | {"notes": list(self.notes)}}) + "\n")
+            write_whole(out, json.dumps({**self.details, "saved": own}) + "\n")
         return out
 
     def report(self, path: str | Path | None = None, *, force: bool = False) -> Path:
@@ -421,7 +427,9 @@ def _loaded(text: str, model: str | os.PathLike[str] | Model | None) -> Result:
             raise PvidError(f"it is of the mechanism {details['model']}, not of {of.name}")
         covariance, notes = np.array(own["covariance"], np.float64), tuple(map(str, own["notes"]))
         made, columns = Made("", (), own["rig"]), own.get("columns") and str(own["columns"])
-        result = _of_details(details, notes, covariance, rig.applied(of), None, made, columns)
+        result = _of_details(
+            details, notes, covariance, rig.applied(of), None, made, columns, str(own.get("words", ""))
+        )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise PvidError(f"{none}: {reason(error)}") from error
     if covariance.size != len(result.parameters) ** 2:
@@ -437,6 +445,7 @@ def _of_details(
     answer: Answer | None,
     made: Made,
     columns: str | None,
+    words: str = "",
 ) -> Result:
     known = {
         name: Parameter(one["value"], one["se"], one["unit"], one["verdict"], one.get("below"))
@@ -446,7 +455,7 @@ def _of_details(
     warning = details["warning"] and in_python(details["warning"])
     advice, notes = tuple(map(in_python, details["advice"])), tuple(map(in_python, notes))
     head = (details["identified"], known, details["verdict"], details["status"], warning)
-    return Result(*head, advice, notes, details, covariance, model, answer, made, columns)
+    return Result(*head, advice, notes, details, covariance, model, answer, made, columns, words)
 
 
 @contextlib.contextmanager
