@@ -289,6 +289,7 @@ def test_lines_among_json_that_are_none_are_left_out(tmp_path: Path) -> None:
         ("a.csv.xz", b"\xfd7zXZ\0 this is not", "not a whole xz file"),
         ("a.json", "{", "is no JSON"),
         ("a.json", '{"t": [0, 1, 2, 3, 4, 5], "F": [0.1, 0.', "one column alone.*; the file ends within a record"),
+        ("a.json", json.dumps({one: dict(enumerate(F.tolist(), 90)) for one in "Fx"}), "no column t"),
         ("a.json", "[]", "has no list of records"),
         ("a.txt", octave(t=T[:, None]).replace("# rows: 2500", "# rows: 2501"), "'t' is not 2501 by 1 numbers"),
         ("a.log", "(1714640400.000001) can0 123#00FF12\n" * 9, "a candump log of CAN frames"),

@@ -14,13 +14,14 @@ from typing import Any
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, reason, shown
-from pvid.rig.columns import Columns
+from pvid.rig.columns import TIME, Columns
 from pvid.rig.csv_table import read_csv, text_table
 from pvid.rig.size import refuse_beyond
 from pvid.rig.table import Table
 from pvid.rig.text_lines import whole
 
 _ROWS = 1 << 14  # a block
+_DATED = 10**8  # s, ms, ... since 1970: an index below it counts rows
 _DAMAGED = 0.05  # of the records, which are left out
 _BETWEEN = re.compile(r"[\s,]*")  # records
 _BRACKETS = re.compile(r'"(?:[^"\\]|\\.)*"|[][{}]')
@@ -164,10 +165,13 @@ def _of_objects(found: Mapping[str, Any]) -> list[Any]:
 
 
 def _indexed(index: Any, records: Iterable[Mapping[str, Any]]) -> list[Any]:
-    """Records with their index as time, where that is more than a count and there is no other."""
+    """Records with their index as time, where it is no count of rows and no other column is called so."""
     rows = list(records)
-    counted = not _is_row(index, len(rows)) or [str(one) for one in index] == [str(k) for k in range(len(rows))]
-    return rows if counted or "t" in rows[0] else [{"t": t, **row} for t, row in zip(index, rows, strict=True)]
+    if not _is_row(index, len(rows)) or any(TIME.is_called(name) for name in rows[0]):
+        return rows
+    if all(str(one).isdecimal() and int(one) < _DATED for one in index):
+        return rows
+    return [{"t": t, **row} for t, row in zip(index, rows, strict=True)]
 
 
 def _is_table(found: Any) -> bool:
