@@ -229,7 +229,7 @@ def test_page_shows_the_names_and_units_of_the_mechanism(logs: dict[str, Path]) 
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("dc_motor", ("Tc [N*m]", "phi [rad]", "excitation of R", ": dc_motor, float32", f"{TICKS} samples")),
+        ("dc_motor", ("Tc [mN·m]", "phi [rad]", "excitation of R", ": dc_motor, float32", f"{TICKS} samples")),
         ("heated_plate", ("C [J/K]", "T [K]", f"{TICKS} samples")),
     ],
 )
