@@ -84,9 +84,7 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
         return of_time
     if answer.recording.origins and answer.found.chi2 > _DIFFER and (own := _of_own(answer)) is not None:
         return (own,)
-    near = _distance(
-        answer, answer.found.p, answer.found.se, answer.found.chi2
-    ).least < _FAR and not _is_beyond_equations(answer)
+    near = _own_distance(answer).least < _FAR and not _is_beyond_equations(answer)
     if answer.identified and answer.found.chi2 < _MISFIT and near:
         return ()
     run = answer.recording.run
@@ -113,7 +111,7 @@ def _unit_of_time(answer: Analysis) -> str | None:
 
     Residuals contain nothing of it: another unit of time gives a linear mechanism other parameters and the same motion.
     """
-    if _distance(answer, answer.found.p, answer.found.se, answer.found.chi2).least < _FAR:
+    if _own_distance(answer).least < _FAR:
         return None
     design = answer.found.design
     low, high = _DOUBTFUL_RATES
@@ -149,6 +147,10 @@ class _Factors(NamedTuple):
     most: float
 
 
+def _own_distance(answer: Analysis) -> _Factors:
+    return _distance(answer, answer.found.p, answer.found.se, answer.found.chi2)
+
+
 def _distance(answer: Analysis, p: Float, se: Float, chi2: float) -> _Factors:
     positive, guess = np.array([(one.positive, one.guess) for one in answer.model.unknowns]).T
     se = np.where(np.isnan(se), 0.0, se)
@@ -179,7 +181,7 @@ def _turned(answer: Analysis) -> Iterator[_Mistake]:
             again = attempted(partial(analysed, turned, answer.model, answer.weights))
             if again is None or not again.identified:
                 continue
-            if (factors := _distance(again, again.found.p, again.found.se, again.found.chi2)).most > _NEAR:
+            if (factors := _own_distance(again)).most > _NEAR:
                 continue
             if min(again.found.r2.values()) > _EXPLAINS:
                 said, unit, _ = next(_mistakes(signal, signals[signal.name]))
