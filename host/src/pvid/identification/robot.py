@@ -16,10 +16,24 @@ from pvid.base.wording import listed, with_unit
 from pvid.identification.answer import Answer, Factors, Float, Value
 from pvid.identification.bodies import Bodies, bodies_of
 from pvid.identification.sensor_prediction import SensorPrediction
-from pvid.model.chain import INERTIAL, WRENCH
+from pvid.model.chain import INERTIAL, WRENCH, Chain
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.missing import student
-from pvid.oracle.weak.robot import GAIN, Lacking, RobotFit, RobotRun, identify_robot, terms_of
+from pvid.oracle.weak.robot import (
+    DEAD,
+    EVERY,
+    GAIN,
+    LATE,
+    LOADED,
+    RATIO,
+    SOFT,
+    ZERO,
+    Lacking,
+    RobotFit,
+    RobotRun,
+    identify_robot,
+    terms_of,
+)
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 
@@ -34,10 +48,10 @@ _WORDS = {
     "the rest",
     "abs(v)*v": "{size} * abs(v)*v of its rate v: one of drag and another gain of that torque",
     "slow": "{size} at low speed: friction that is not dry plus viscous; move faster",
+    DEAD: "{size} less than it is on either side of 0: a dead band",
     "v": "{size} * its rate: drag",
-    GAIN: "a gain about {size} those of the others: one of its torque constant, its gear and its unit",
 }
-_UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2", "slow": "", "v": "*s/{unit}"}
+_UNITS = {"q": "/{unit}", "1": "", "abs(v)*v": "*s^2/{unit}^2", "slow": "", DEAD: "", "v": "*s/{unit}"}
 _SEEN = 1e-6  # relative size of a direction that the torques depend on
 _CLEAR_MASS = 3.0  # standard errors: a payload of less has no centre
 _PAYLOAD = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -115,15 +129,7 @@ class RobotAnswer(Answer):
             moved = [k for k in np.argsort(-np.abs(one.shift) / sd) if abs(one.shift[k]) > sd[k]]
             if one.law == GAIN and (springs or not moved):
                 continue  # within what the gains' own errors are, or of a wrong gravity
-            slides = chain.joints[one.joint].prismatic
-            number = chain.number(one.joint)
-            if one.law == GAIN:
-                size = f"{abs(one.size):.0%} {'above' if one.size > 0 else 'below'}"
-            else:
-                unit = ("N" if slides else "N*m") + _UNITS[one.law].format(unit="m" if slides else "rad")
-                size = with_unit(one.size, unit, 3)
-            of = _WORDS[one.law].format(size=size, joint=number)
-            text = f"the {chain.force(one.joint)} has what the equations lack, {of}"
+            text = _told(chain, one)
             if moved:
                 k = moved[0]
                 text += f"; with that {names[k]} would be {fit.p[k] + one.shift[k]:.4g} in place of {fit.p[k]:.4g}"
@@ -265,15 +271,44 @@ class RobotAnswer(Answer):
         }
 
 
+def _told(chain: Chain, one: Lacking) -> str:
+    """What a robot has beyond its equations."""
+    if one.law == LATE:
+        which = "every torque is" if one.joint == EVERY else f"the {chain.force(one.joint)} is"
+        late = "late" if one.size > 0 else "early"
+        return f"{which} {with_unit(abs(one.size), 's', 3)} {late} against the positions: one of a filter and a clock"
+    number, slides = chain.number(one.joint), chain.joints[one.joint].prismatic
+    force, length = ("N", "m") if slides else ("N*m", "rad")
+    if one.law == ZERO:
+        size = with_unit(abs(one.size), length, 3)
+        large = "large" if one.size > 0 else "small"
+        return f"{chain.position(one.joint)} is {size} too {large}: its zero is not the file's"
+    if one.law == RATIO:
+        more = f"{abs(one.size):.2%} {'larger' if one.size > 0 else 'smaller'}"
+        return (
+            f"{chain.position(one.joint)} is {more} than in the equations: one of its gear ratio and its counts a turn"
+        )
+    if one.law == SOFT:
+        size = with_unit(one.size, f"{length}/({force})", 3)
+        return f"joint {number} gives way by {size} of its load behind its encoder"
+    lacks = f"the {chain.force(one.joint)} has what the equations lack, "
+    if one.law == GAIN:
+        size = f"{abs(one.size):.0%} {'above' if one.size > 0 else 'below'}"
+        return f"{lacks}a gain about {size} those of the others: one of its torque constant, its gear and its unit"
+    if one.law == LOADED:
+        return f"{lacks}{one.size:.1%} of the load as dry friction"
+    size = with_unit(one.size, force + _UNITS[one.law].format(unit=length), 3)
+    return lacks + _WORDS[one.law].format(size=size, joint=number)
+
+
 def sure(fit: RobotFit) -> tuple[Lacking, ...]:
     """The terms that are missing, with the sizes that they have together."""
     terms = [law for law, _ in terms_of(fit.run.chain) if law != GAIN]  # a gain is to be twice as sure
     limit = student(_APART * fit.windows, _CHANCE / 2 / len(terms))
     found: tuple[Lacking, ...] = ()
-    for together in fit.lacking:
-        if together[-1].t <= limit:
-            break
-        found = together
+    for together in fit.lacking:  # the first may hide among those that come after it
+        if together[-1].t > limit:
+            found = together
     return found
 
 

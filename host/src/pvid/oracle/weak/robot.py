@@ -73,14 +73,28 @@ LAWS: Mapping[str, Callable[[Float, Float], Float]] = {  # of positions and rate
     "v": lambda q, v: v,
 }
 GAIN = "gain"  # of a recorded torque, in a robot of several: a law whose column is the predicted torque
+LATE = "late"  # recorded torque, of a joint or of EVERY one: the slope of the torque
+LOADED, DEAD = "loaded", "dead"  # friction that grows with the load of its joint; a dead band of a torque
+ZERO, RATIO, SOFT = "zero", "ratio", "soft"  # what an encoder reads beside the position: 1, the position and the load
+EVERY = -1  # joint
 _OF_FREE = ("1", "abs(v)*v", "v")  # of the joints of a free base; the others have friction
+_PREDICTED = (LOADED, DEAD, ZERO, RATIO, SOFT)  # laws whose columns are computed with the parameters
+_POSITIVE = (LOADED, DEAD, SOFT)
+_THINNED = 8  # of the taps of the polynomials: steps at which the torques' slopes over the positions are computed
+_SMALL = 1e-6  # change of a position or rate
+_FIRST = 0.5  # of the torques, of a position, of 1 rad: what is small enough for a first order
 
 
 def terms_of(chain: Chain) -> list[tuple[str, int]]:
     """(law, joint) of what a robot may have beyond its equations."""
     joints = range(len(chain.joints))
     terms = [(law, k) for law in LAWS for k in joints if ((law in _OF_FREE) if k < chain.free else law != "v")]
-    return terms + [(GAIN, k) for k in joints if k >= chain.free and len(joints) > 1]
+    own = [k for k in joints if k >= chain.free]
+    if len(joints) > 1:
+        terms += [(GAIN, k) for k in own]
+    if len(own) > 1:
+        terms.append((LATE, EVERY))
+    return terms + [(law, k) for law in (LATE, *_PREDICTED) for k in own]
 
 
 def shortest_run(sample_rate: float) -> float:
@@ -327,10 +341,11 @@ class RobotRows:
     Attributes
     ----------
     regressors, known : of each joint [n, windows, p, K] and its torque [n, windows, K]
-    others : of each law of LAWS, which the equations do not have [laws, n, windows, K]
+    others : of each law of LAWS, which the equations do not have, and of LATE [laws + 1, n, windows, K]
     doubts : directions that do not count [n, windows, K, ..]
     next : of each window but the last, whether the one behind it overlaps it [windows - 1]
     free : part of the rows that counts, of each joint [n]
+    weights : that made the rows white [n, windows, K, K]; None: they are not
     """
 
     regressors: Float
@@ -339,6 +354,7 @@ class RobotRows:
     doubts: Float
     next: npt.NDArray[np.bool_]
     free: Float
+    weights: Float | None = None
 
     @classmethod
     def of(cls, run: RobotRun, columns: Sequence[int], seed: int | None = None, sign: int = 1) -> RobotRows:
@@ -366,8 +382,8 @@ class RobotRows:
                 own[joint, :, place] += one @ tables[order]
             parts.append(own)
             known.append(functions.window_sums(segment.torque) @ tables[0])
-            laws = [of(segment.position, segment.rate) for of in LAWS.values()]
-            others.append(np.array([functions.window_sums(one) @ tables[0] for one in laws]))
+            laws = [functions.window_sums(of(segment.position, segment.rate)) @ tables[0] for of in LAWS.values()]
+            others.append(np.array([*laws, -functions.window_sums(segment.torque) @ tables[1]]))
             doubts.append(np.array([_doubts(*one, functions) for one in zip(segment.rate, noise, strict=True)]))
             doubts[-1][: run.chain.free] = 0.0  # they have no dry friction
             follows += [*([True] * (sums.shape[1] - 1)), False]
@@ -392,9 +408,8 @@ class RobotRows:
         roots = left @ roots[:, np.newaxis]
         x = np.einsum("iwpk,iwjk->iwpj", self.regressors, roots, optimize=True)
         y = np.einsum("iwk,iwjk->iwj", self.known, roots)
-        others = np.einsum("liwk,iwjk->liwj", self.others, roots, optimize=True)
         free = np.trace(left, axis1=2, axis2=3).mean(axis=1) / doubts.shape[2]
-        return RobotRows(x, y, others, self.doubts, self.next, free)
+        return RobotRows(x, y, _weighted(self.others, roots), self.doubts, self.next, free, roots)
 
     def moments(self, windows: slice = slice(None)) -> tuple[Float, Float]:
         """S [p, p] and, of each joint, its part of F [n, p]."""
@@ -411,14 +426,20 @@ class RobotRows:
         return np.asarray(np.einsum("iwpk,iwk->wp", self.regressors, self.residuals(p), optimize=True))
 
 
+def _weighted(columns: Float, weights: Float) -> Float:
+    """Columns [.., n, windows, K], of white rows."""
+    return np.asarray(np.einsum("...iwk,iwjk->...iwj", columns, weights, optimize=True))
+
+
 @dataclass(frozen=True)
 class Lacking:
     """A term that the equations do not have, to first order.
 
     Attributes
     ----------
-    law, joint : name in LAWS, or GAIN, and the joint from 0
-    size : of the term [N m or N over the unit of the law]
+    law, joint : name in LAWS, or GAIN, LATE, .., and the joint from 0, or EVERY
+    size : of the term [N m or N over the unit of the law; s of LATE; of ZERO that of the position, of SOFT that over
+        the torque's; GAIN, LOADED and RATIO are relative]
     t : the size over its standard error when it was added, from the scatter of the windows, at least that of the rows;
         of soft friction that another joint has too, ALIKE times that, and of a gain 1 / ALIKE times
     shift : what p moves by with the term [p]
@@ -580,7 +601,7 @@ def identify_robot(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sampl
     apart = np.abs(halves[0] - halves[1]) / np.sqrt(np.sum(variances, axis=0))
     return RobotFit(
         whole, columns, p, covariance, by_gain, uncorrected, np.array(halves), apart, undetermined, rows.windows,
-        tuple(_lacking(white, p, bread, terms_of(whole.chain))), _springs(white, bread),
+        tuple(_lacking(whole, white, columns, p, bread)), _springs(white, bread),
     )  # fmt: skip
 
 
@@ -593,26 +614,33 @@ def _springs(white: RobotRows, bread: Float) -> Float:
     return np.asarray(np.where(taken[:, np.newaxis] > _HIDDEN, moved, 0.0))
 
 
-def _lacking(white: RobotRows, p: Float, bread: Float, terms: list[tuple[str, int]]) -> Iterator[tuple[Lacking, ...]]:
+def _lacking(
+    whole: RobotRun, white: RobotRows, columns: Sequence[int], p: Float, bread: Float
+) -> Iterator[tuple[Lacking, ...]]:
     """Scores of the laws in the residuals of p, and beside those that were surest before.
 
     Parameters
     ----------
+    columns : of the regressors, as of RobotFit
     bread : (X^T X)^-1, the noise of the encoders taken off
-    terms : as `terms_of`
     """
-    e = white.residuals(p)
-    columns = np.array([white.known[joint] - e[joint] if law == GAIN else white.others[list(LAWS).index(law), joint]
-                        for law, joint in terms])  # fmt: skip
-    mixed = np.array([bread @ np.einsum("wpk,wk->p", white.regressors[joint], column)
-                      for (_, joint), column in zip(terms, columns, strict=True)])  # fmt: skip
-    rests = -np.einsum("iwpk,tp->tiwk", white.regressors, mixed, optimize=True)
-    for rest, column, (_, joint) in zip(rests, columns, terms, strict=True):
-        rest[joint] += column
-    joints = [joint for _, joint in terms]
-    products = np.array([np.einsum("twk,twk->t", rest[joints], columns) for rest in rests])
-    gains, free = np.einsum("twk,twk->t", e[joints], columns), np.diag(products) > _DIRECTION * np.sum(
-        columns**2, axis=(1, 2))  # fmt: skip
+    e, terms = white.residuals(p), terms_of(whole.chain)
+    effects = dict(zip(_PREDICTED, _predicted(whole, white, columns, p), strict=True))
+    rows = np.zeros((len(terms), *e.shape))
+    for row, (law, joint) in zip(rows, terms, strict=True):
+        if law in effects:
+            row[:] = effects[law][joint]
+            continue
+        of = slice(None) if joint == EVERY else joint
+        row[of] = (white.known - e if law == GAIN else white.others[[*LAWS, LATE].index(law)])[of]
+    flat = white.regressors.transpose(2, 0, 1, 3).reshape(len(p), -1)
+    mixed = rows.reshape(len(terms), -1) @ flat.T @ bread
+    rests = rows - (mixed @ flat).reshape(rows.shape)
+    products = rests.reshape(len(terms), -1) @ rows.reshape(len(terms), -1).T
+    gains = np.tensordot(rows, e, 3)
+    free = np.diag(products) > _DIRECTION * np.sum(rows**2, axis=(1, 2, 3))
+    taken = np.any(rows, axis=(2, 3)) @ np.sum(white.known**2, axis=(1, 2))
+    most = _most(whole.chain, terms, np.sqrt(taken / np.sum(rows**2, axis=(1, 2, 3))))
     chosen: list[int] = []
     sure: list[float] = []
     while len(chosen) < max(_TERMS, len(e)):
@@ -625,21 +653,76 @@ def _lacking(white: RobotRows, p: Float, bread: Float, terms: list[tuple[str, in
             if k in chosen or left <= _DIRECTION * inner[-1, -1]:
                 continue  # the parameters have it, or the others
             sizes = np.linalg.solve(inner, gains[own])
+            if abs(sizes[-1]) > most[k] or (terms[k][0] in _POSITIVE and sizes[-1] < 0):
+                continue
             rest = rests[k] - np.tensordot(beside, rests[chosen], 1)
             scores = np.sum(rest * (e - np.tensordot(sizes, rests[own], 1)), axis=(0, 2))
             twice = 2 * float(np.sum((scores[:-1] * scores[1:])[white.next]))
             t = float(sizes[-1]) * left / math.sqrt(max(np.sum(scores**2) + max(twice, 0.0), left))
             alike = terms[k][0] == "slow" and any(terms[one][0] == "slow" for one in chosen)
-            surer = ALIKE if alike else 1 / ALIKE if terms[k][0] == GAIN else 1.0
-            best = max(best, (abs(t) * surer, int(k)))
+            best = max(best, (abs(t) * (ALIKE if alike else 1.0), int(k)))
         if best[1] < 0:
             return
         chosen.append(best[1])
-        sure.append(best[0])
+        sure.append(best[0] / (ALIKE if terms[best[1]][0] == GAIN else 1.0))
         sizes = np.linalg.solve(products[np.ix_(chosen, chosen)], gains[chosen])
         yield tuple(
             Lacking(*terms[k], float(size), t, -size * mixed[k]) for k, size, t in zip(chosen, sizes, sure, strict=True)
         )
+
+
+def _most(chain: Chain, terms: Sequence[tuple[str, int]], whole: Float) -> Float:
+    """Sizes up to which terms are to first order [terms]; `whole`: those that make as much as the torques."""
+    return np.array([
+        math.inf if law in LAWS or law == GAIN
+        else _FIRST if law in (LOADED, RATIO) or (law == ZERO and not chain.joints[joint].prismatic)
+        else _FIRST * size
+        for (law, joint), size in zip(terms, whole, strict=True)
+    ])  # fmt: skip
+
+
+def _predicted(whole: RobotRun, white: RobotRows, columns: Sequence[int], p: Float) -> Float:
+    """White rows, for the parameters p, of each law of _PREDICTED at each joint, to first order
+    [laws, n, n, windows, K]."""
+    from scipy.interpolate import CubicSpline  # a quarter of a second
+
+    functions, n = whole.design.functions, len(whole.chain.joints)
+    program, entries = whole.chain.program(columns)
+    tables = [functions.combine(0), -functions.combine(1)]
+
+    def moved(q: Float, v: Float) -> Float:
+        """Torques, and momenta, whose slopes are torques [2, n, steps], without friction."""
+        out = np.zeros((2, *q.shape))
+        for first in range(0, q.shape[1], _STEPS):
+            own = slice(first, first + _STEPS)
+            for (order, joint, place), one in zip(entries, evaluated(program, [*q[:, own], *v[:, own]]), strict=True):
+                out[order, joint, own] += p[place] * one
+        return out
+
+    parts = []
+    for segment in whole.values(columns, _STEPS):
+        steps = segment.position.shape[1]
+        thin = np.linspace(0, steps - 1, -(-steps * _THINNED // max(whole.design.taps, _THINNED))).astype(int)
+        t, every = thin / whole.sample_rate, np.arange(steps) / whole.sample_rate
+        q, v = segment.position[:, thin], segment.rate[:, thin]
+        given = moved(q, v)
+        loads = CubicSpline(t, given[0] + CubicSpline(t, given[1], axis=1)(t, 1), axis=1)
+        load, slope, torque = loads(t), loads(t, 1), loads(every)
+        loaded = np.abs(torque) * np.sign(segment.rate)
+        for place, joint, column in friction(whole.chain, columns):
+            torque[joint] += p[place] * column(segment.rate[joint])
+        own = np.zeros((len(_PREDICTED), n, n, steps // functions.hop - 1, functions.count))
+        for k in range(whole.chain.free, n):
+            for law, one in enumerate((loaded[k], -np.sign(torque[k]))):
+                own[law, k, k] = functions.window_sums(one) @ tables[0]
+            small = _SMALL * np.eye(n)[k][:, np.newaxis]
+            by_q, by_v = (moved(q + small, v) - given) / _SMALL, (moved(q, v + small) - given) / _SMALL
+            for law, one in enumerate((by_q, q[k] * by_q + v[k] * by_v, load[k] * by_q + slope[k] * by_v), 2):
+                sums = functions.window_sums(CubicSpline(t, one, axis=2)(every))
+                own[law, k] = -sum(it @ table for it, table in zip(sums, tables, strict=True))
+        parts.append(own)
+    assert white.weights is not None
+    return _weighted(np.concatenate(parts, axis=3), white.weights)
 
 
 def _idle_parts(whole: RobotRun, rows: RobotRows, grams: Float) -> Float:
