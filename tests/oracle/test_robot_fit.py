@@ -142,44 +142,38 @@ def test_of_two_terms_that_are_missing_each_is_named_with_its_size() -> None:
         assert sizes == pytest.approx({("q", 1): 4.0, ("1", 2): 0.3}, rel=0.1)
 
 
-def _exact(seed: int) -> tuple[Any, Any, Any, dict[str, Any]]:
-    """Positions, rates, torques of the bodies alone, and the log."""
-    t, q, v, a = robot_arms.motion(3, 20.0, RATE, seed)
-    return q, v, robot_arms.torques(SPATIAL, q, v, a), robot_arms.log_of(SPATIAL, seed)
-
-
 def _late(log: dict[str, Any], joints: Sequence[int], seconds: float) -> None:
     for k in joints:
         log[f"tau{k}"] = np.interp(log["t"] - seconds, log["t"], log[f"tau{k}"])
 
 
 def _dead(log: dict[str, Any], whole: Any) -> None:
-    log["tau1"] += np.clip(whole, -0.2, 0.2) - 2 * np.clip(whole, -0.2, 0.2)
+    log["tau1"] -= np.clip(whole, -0.2, 0.2)
 
 
-BESIDE: dict[str, tuple[Callable[[dict[str, Any], Any, Any, Any], Any], str]] = {
+BESIDE: dict[str, tuple[Callable[[dict[str, Any], Any, Any], Any], str]] = {  # of rates, and torques of the bodies
     "every torque late": (
-        lambda log, q, v, tau: _late(log, (1, 2, 3), 0.004),
+        lambda log, v, tau: _late(log, (1, 2, 3), 0.004),
         r"every torque is 0\.00(3|4)\d* s late against the positions: one of a filter and a clock; with that",
     ),
     "one torque late": (
-        lambda log, q, v, tau: _late(log, (3,), 0.004),
+        lambda log, v, tau: _late(log, (3,), 0.004),
         r"the torque of joint 3 is 0\.00(3|4)\d* s late against the positions: one of a filter and a clock; with that",
     ),
     "zero": (
-        lambda log, q, v, tau: log.update(q2=log["q2"] + 0.04),
+        lambda log, v, tau: log.update(q2=log["q2"] + 0.04),
         r"q2 is 0\.0(3|4)\d* rad too large: its zero is not the file's; with that",
     ),
     "ratio": (
-        lambda log, q, v, tau: log.update(q3=log["q3"] * 1.02),
+        lambda log, v, tau: log.update(q3=log["q3"] * 1.02),
         r"q3 is (1\.[89]|2\.[01])\d?% larger than in the equations: one of its gear ratio and its counts a turn; with",
     ),
     "load": (
-        lambda log, q, v, tau: log.update(tau2=log["tau2"] + 0.06 * np.abs(tau[1]) * np.sign(v[1])),
+        lambda log, v, tau: log.update(tau2=log["tau2"] + 0.06 * np.abs(tau[1]) * np.sign(v[1])),
         r"the torque of joint 2 has what the equations lack, (5\.[89]|6\.[01])% of the load as dry friction; .*Fc2",
     ),
     "dead band": (
-        lambda log, q, v, tau: _dead(log, tau[0] + 0.5 * v[0] + np.sign(v[0])),
+        lambda log, v, tau: _dead(log, tau[0] + 0.5 * v[0] + np.sign(v[0])),
         r"the torque of joint 1 has what the equations lack, 0\.[12]\d* N\*m less than it is on either side of 0: a",
     ),
 }
@@ -187,10 +181,12 @@ BESIDE: dict[str, tuple[Callable[[dict[str, Any], Any, Any, Any], Any], str]] = 
 
 @pytest.mark.parametrize("name", BESIDE)
 def test_what_torques_and_encoders_have_beside_the_equations_is_named(name: str) -> None:
-    """Until these laws the first four were silent or misnamed, up to 27 standard errors off."""
+    """Without these laws a late torque and the load, 10.8 standard errors off, were silent; the others had other names,
+    and were up to 17 off."""
     changed, text = BESIDE[name]
-    q, v, tau, log = _exact(0)
-    changed(log, q, v, tau)
+    log = robot_arms.log_of(SPATIAL, 0)
+    _, q, v, a = robot_arms.motion(3, 20.0, RATE, 0)
+    changed(log, v, robot_arms.torques(SPATIAL, q, v, a))
     found = answer_of_robot(Recording(log.pop("t"), log, RATE), model_of(SPATIAL))
     told = [one.text for one in found.verdict.reasons if one.alarm]
     assert len(told) == 1 and re.match(text, told[0]), told

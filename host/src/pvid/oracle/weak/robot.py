@@ -303,6 +303,17 @@ class Segment:
             found += [column(rate[joint]) for _, joint, column in others]
             yield np.array([np.broadcast_to(one, rate.shape[1:]) for one in found])
 
+    def torques(self, p: Float) -> Float:
+        """Torques, and momenta, whose slopes are torques too, of parameters [.., p]: [2, n, .., steps]."""
+        out = np.zeros((2, len(self.position), *p.shape[:-1], self.position.shape[1]))
+        first = 0
+        for values in self.pieces():
+            own = slice(first, first + values.shape[1])
+            for (order, joint, place), one in zip(self.entries, values, strict=True):
+                out[order, joint, ..., own] += p[..., place, np.newaxis] * one
+            first = own.stop
+        return out
+
 
 def _generalised(wrench: Sequence[Float], turned: Sequence[Float]) -> list[Float]:
     """What a force and a moment in the frame of a free base do along its joints [6, samples], turned by yaw, pitch and
@@ -381,9 +392,10 @@ class RobotRows:
             for (order, joint, place), one in zip(segment.entries, sums, strict=True):
                 own[joint, :, place] += one @ tables[order]
             parts.append(own)
-            known.append(functions.window_sums(segment.torque) @ tables[0])
+            torques = functions.window_sums(segment.torque)
+            known.append(torques @ tables[0])
             laws = [functions.window_sums(of(segment.position, segment.rate)) @ tables[0] for of in LAWS.values()]
-            others.append(np.array([*laws, -functions.window_sums(segment.torque) @ tables[1]]))
+            others.append(np.array([*laws, -torques @ tables[1]]))
             doubts.append(np.array([_doubts(*one, functions) for one in zip(segment.rate, noise, strict=True)]))
             doubts[-1][: run.chain.free] = 0.0  # they have no dry friction
             follows += [*([True] * (sums.shape[1] - 1)), False]
@@ -498,18 +510,12 @@ class RobotFit:
     def predicted(self, run: RobotRun, p: Float, seed: int | None = None) -> Iterator[tuple[Float, Float]]:
         """Torques of each segment of a run, measured and as each of several p [.., p] gives them: [n, steps] and
         [n, .., steps]; `seed` as of RobotRun.values."""
-        n, taps = len(run.chain.joints), 2 * self.design.taps + 1
+        taps = 2 * self.design.taps + 1
         weights = polynomial_weights(taps, POLYNOMIAL, 1) * run.sample_rate
         for segment in run.values(self.columns, _STEPS, seed):
             if segment.position.shape[1] < taps:
                 continue
-            whole = np.zeros((2, n, len(p), segment.position.shape[1]))
-            first = 0
-            for values in segment.pieces():
-                own = slice(first, first + values.shape[1])
-                for (order, joint, place), one in zip(segment.entries, values, strict=True):
-                    whole[order, joint, :, own] += p[:, place, np.newaxis] * one
-                first = own.stop
+            whole = segment.torques(p)
             inner = slice(taps // 2, whole.shape[-1] - taps // 2)
             slopes = np.apply_along_axis(filtered, -1, whole[1], weights)
             yield segment.torque[:, inner], (whole[0] + slopes)[..., inner]
@@ -633,30 +639,30 @@ def _lacking(
             continue
         of = slice(None) if joint == EVERY else joint
         row[of] = (white.known - e if law == GAIN else white.others[[*LAWS, LATE].index(law)])[of]
-    flat = white.regressors.transpose(2, 0, 1, 3).reshape(len(p), -1)
-    mixed = rows.reshape(len(terms), -1) @ flat.T @ bread
-    rests = rows - (mixed @ flat).reshape(rows.shape)
-    products = rests.reshape(len(terms), -1) @ rows.reshape(len(terms), -1).T
-    gains = np.tensordot(rows, e, 3)
-    free = np.diag(products) > _DIRECTION * np.sum(rows**2, axis=(1, 2, 3))
+    flat, own = rows.reshape(len(terms), -1), white.regressors.transpose(2, 0, 1, 3).reshape(len(p), -1)
+    mixed = flat @ own.T @ bread
+    rests = rows - (mixed @ own).reshape(rows.shape)
+    products = rests.reshape(len(terms), -1) @ flat.T
+    gains, power = np.tensordot(rows, e, 3), np.sum(rows**2, axis=(1, 2, 3))
+    free = np.diag(products) > _DIRECTION * power
     taken = np.any(rows, axis=(2, 3)) @ np.sum(white.known**2, axis=(1, 2))
-    most = _most(whole.chain, terms, np.sqrt(taken / np.sum(rows**2, axis=(1, 2, 3))))
+    most = _most(whole.chain, terms, np.sqrt(taken / power))
     chosen: list[int] = []
     sure: list[float] = []
     while len(chosen) < max(_TERMS, len(e)):
         best = (0.0, -1)
         for k in np.flatnonzero(free):
-            own = [*chosen, int(k)]
-            inner = products[np.ix_(own, own)]
+            together = [*chosen, int(k)]
+            inner = products[np.ix_(together, together)]
             beside = np.linalg.solve(inner[:-1, :-1], inner[:-1, -1])
             left = float(inner[-1, -1] - inner[-1, :-1] @ beside)
             if k in chosen or left <= _DIRECTION * inner[-1, -1]:
                 continue  # the parameters have it, or the others
-            sizes = np.linalg.solve(inner, gains[own])
+            sizes = np.linalg.solve(inner, gains[together])
             if abs(sizes[-1]) > most[k] or (terms[k][0] in _POSITIVE and sizes[-1] < 0):
                 continue
             rest = rests[k] - np.tensordot(beside, rests[chosen], 1)
-            scores = np.sum(rest * (e - np.tensordot(sizes, rests[own], 1)), axis=(0, 2))
+            scores = np.sum(rest * (e - np.tensordot(sizes, rests[together], 1)), axis=(0, 2))
             twice = 2 * float(np.sum((scores[:-1] * scores[1:])[white.next]))
             t = float(sizes[-1]) * left / math.sqrt(max(np.sum(scores**2) + max(twice, 0.0), left))
             alike = terms[k][0] == "slow" and any(terms[one][0] == "slow" for one in chosen)
@@ -687,36 +693,28 @@ def _predicted(whole: RobotRun, white: RobotRows, columns: Sequence[int], p: Flo
     from scipy.interpolate import CubicSpline  # a quarter of a second
 
     functions, n = whole.design.functions, len(whole.chain.joints)
-    program, entries = whole.chain.program(columns)
-    tables = [functions.combine(0), -functions.combine(1)]
-
-    def moved(q: Float, v: Float) -> Float:
-        """Torques, and momenta, whose slopes are torques [2, n, steps], without friction."""
-        out = np.zeros((2, *q.shape))
-        for first in range(0, q.shape[1], _STEPS):
-            own = slice(first, first + _STEPS)
-            for (order, joint, place), one in zip(entries, evaluated(program, [*q[:, own], *v[:, own]]), strict=True):
-                out[order, joint, own] += p[place] * one
-        return out
-
+    tables, rubbing = [functions.combine(0), -functions.combine(1)], list(friction(whole.chain, columns))
+    bodies = p.copy()
+    bodies[[place for place, _, _ in rubbing]] = 0.0
     parts = []
     for segment in whole.values(columns, _STEPS):
         steps = segment.position.shape[1]
         thin = np.linspace(0, steps - 1, -(-steps * _THINNED // max(whole.design.taps, _THINNED))).astype(int)
         t, every = thin / whole.sample_rate, np.arange(steps) / whole.sample_rate
         q, v = segment.position[:, thin], segment.rate[:, thin]
-        given = moved(q, v)
+        given = replace(segment, position=q, rate=v).torques(bodies)
         loads = CubicSpline(t, given[0] + CubicSpline(t, given[1], axis=1)(t, 1), axis=1)
         load, slope, torque = loads(t), loads(t, 1), loads(every)
         loaded = np.abs(torque) * np.sign(segment.rate)
-        for place, joint, column in friction(whole.chain, columns):
+        for place, joint, column in rubbing:
             torque[joint] += p[place] * column(segment.rate[joint])
         own = np.zeros((len(_PREDICTED), n, n, steps // functions.hop - 1, functions.count))
         for k in range(whole.chain.free, n):
             for law, one in enumerate((loaded[k], -np.sign(torque[k]))):
                 own[law, k, k] = functions.window_sums(one) @ tables[0]
             small = _SMALL * np.eye(n)[k][:, np.newaxis]
-            by_q, by_v = (moved(q + small, v) - given) / _SMALL, (moved(q, v + small) - given) / _SMALL
+            near = (replace(segment, position=q + small, rate=v), replace(segment, position=q, rate=v + small))
+            by_q, by_v = ((one.torques(bodies) - given) / _SMALL for one in near)
             for law, one in enumerate((by_q, q[k] * by_q + v[k] * by_v, load[k] * by_q + slope[k] * by_v), 2):
                 sums = functions.window_sums(CubicSpline(t, one, axis=2)(every))
                 own[law, k] = -sum(it @ table for it, table in zip(sums, tables, strict=True))
